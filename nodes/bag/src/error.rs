@@ -106,6 +106,31 @@ impl BagError {
         self
     }
 
+    /// The damage without its remedy.
+    pub(crate) fn cause(&self) -> String {
+        match self {
+            BagError::Truncated {
+                path,
+                size_bytes,
+                inside,
+                readable_messages,
+            } => {
+                let path = path.display();
+                format!(
+                    "{path}: truncated: the file ends at byte {size_bytes} inside {inside}; \
+                     {readable_messages} messages precede it"
+                )
+            }
+            BagError::Corrupt {
+                path,
+                position,
+                reason,
+                ..
+            } => format!("{}: damaged at {position}: {reason}", path.display()),
+            other => other.to_string(),
+        }
+    }
+
     pub(crate) fn io(path: &Path, doing: &'static str) -> impl FnOnce(io::Error) -> BagError {
         move |source| BagError::Io {
             path: path.to_path_buf(),
@@ -147,7 +172,7 @@ impl BagError {
             path,
             position,
             source,
-            "recover the rows with `sqlite3 FILE .recover` or take another copy",
+            "take another copy, or rescue the rest with `lattice bag recover`",
         )
     }
 }

@@ -26,7 +26,7 @@ pub use messages::Messages;
 pub use player::{PlayedTopic, Player, PlayerOptions, Step};
 pub use qos::BagQos;
 pub use reader::{BagReader, ReadOptions};
-pub use recover::{Recovered, recover};
+pub use recover::{Recovered, Unchecked, recover};
 use topic::MAX_MESSAGE_BYTES;
 pub use topic::{BagMessage, STATIC_DEPTH, Storage, TopicInfo};
 pub use writer::{BagWriter, Compression, TopicSpec, WriterOptions, replaceable};

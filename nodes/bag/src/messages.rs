@@ -22,8 +22,7 @@ pub(crate) enum MessageCompression {
 }
 
 /// Messages of a bag in order of log time. Holds one message per storage file that overlaps in
-/// time, and for MCAP the chunks that overlap. Ends after the first error, and without one where the last file of a
-/// recorder that was killed is cut.
+/// time, and for MCAP the chunks that overlap. Ends after the first error.
 pub struct Messages {
     splits: Arc<[Split]>,
     topics: Arc<[TopicInfo]>,
@@ -33,9 +32,10 @@ pub struct Messages {
     /// Not yet opened, in order of time.
     pending: VecDeque<usize>,
     active: Vec<Active>,
-    /// True of a folder whose recorder was killed: it lacks `metadata.yaml`.
-    unfinished: bool,
+    /// True to end a file that is cut without an error.
+    past_cut: bool,
     messages_read: u64,
+    unchecked: bool,
     ended: bool,
 }
 
@@ -55,7 +55,7 @@ impl Messages {
         topics: Arc<[TopicInfo]>,
         filter: Filter,
         compression: MessageCompression,
-        unfinished: bool,
+        past_cut: bool,
     ) -> Messages {
         let in_range = |split: &Split| {
             split
@@ -76,10 +76,16 @@ impl Messages {
             compression,
             pending,
             active: Vec::new(),
-            unfinished,
+            past_cut,
             messages_read: 0,
+            unchecked: false,
             ended: false,
         }
+    }
+
+    /// True if the last message came from a damaged chunk, whose checksum is wrong.
+    pub(crate) fn is_unchecked(&self) -> bool {
+        self.unchecked
     }
 
     /// Opens the next split if it may hold the next message.
@@ -127,13 +133,9 @@ impl Messages {
         Ok(())
     }
 
-    /// True for the error by which the last file of a killed recorder ends; the reader has warned of it.
-    fn is_end_of_unfinished(&self, error: &BagError) -> bool {
-        self.unfinished
-            && !self.filter.past_damage
-            && matches!(error, BagError::Truncated { .. })
-            && self.active.is_empty()
-            && self.pending.is_empty()
+    /// True for the error by which a cut file ends, where that is no error; the reader has warned of it.
+    fn is_passed_cut(&self, error: &BagError) -> bool {
+        self.past_cut && !self.filter.past_damage && matches!(error, BagError::Truncated { .. })
     }
 
     fn take_first(&mut self) -> Option<Result<BagMessage, BagError>> {
@@ -150,6 +152,7 @@ impl Messages {
             active.head_ns = message.log_time_ns;
         }
         let head = std::mem::replace(&mut active.head, next)?;
+        self.unchecked = head.as_ref().is_ok_and(|message| message.unchecked);
         let message = active.of_bag(head, self.compression, self.messages_read);
         self.messages_read += 1;
         if active.head.is_none() {
@@ -198,13 +201,15 @@ impl Iterator for Messages {
         if self.ended {
             return None;
         }
-        let next = match self.open_due() {
-            Ok(()) => self.take_first(),
-            Err(error) => Some(Err(error)),
-        };
-        let next = match next {
-            Some(Err(error)) if self.is_end_of_unfinished(&error) => None,
-            next => next,
+        let next = loop {
+            let next = match self.open_due() {
+                Ok(()) => self.take_first(),
+                Err(error) => Some(Err(error)),
+            };
+            match next {
+                Some(Err(error)) if self.is_passed_cut(&error) => {}
+                next => break next,
+            }
         };
         self.ended = match &next {
             None => true,

@@ -41,8 +41,8 @@ pub struct BagReader {
     ros_distro: String,
     splits: Arc<[Split]>,
     compression: MessageCompression,
-    /// True of a folder without `metadata.yaml`, which a recorder writes at its end.
-    unfinished: bool,
+    /// True to end a file that is cut without an error.
+    past_cut: bool,
 }
 
 impl BagReader {
@@ -58,7 +58,7 @@ impl BagReader {
         if !metadata_path.exists() {
             let reader = Self::assemble(path, None, splits_in(path)?)?;
             return Ok(BagReader {
-                unfinished: true,
+                past_cut: true,
                 ..reader
             });
         }
@@ -116,6 +116,27 @@ impl BagReader {
         open.map(|open| open.info().implausible).sum()
     }
 
+    /// The same bag, whose cut files end without an error: what is in [`BagReader::cuts`].
+    pub fn past_cut(self) -> BagReader {
+        BagReader {
+            past_cut: true,
+            ..self
+        }
+    }
+
+    /// Files that end early, each with the number of its messages.
+    pub fn cuts(&self) -> Vec<String> {
+        let damages = self.splits.iter().filter_map(Split::damage);
+        let is_cut = |damage: &BagError| matches!(damage, BagError::Truncated { .. });
+        damages.filter(is_cut).map(|cut| cut.cause()).collect()
+    }
+
+    /// Messages by the counts of the storage files themselves; nothing where one of them is damaged.
+    pub(crate) fn claimed(&self) -> Option<u64> {
+        let of = |split: &Split| split.open.as_ref()?.claimed();
+        self.splits.iter().map(of).sum()
+    }
+
     /// True if all storage files are of SQLite.
     pub(crate) fn is_sqlite(&self) -> bool {
         self.splits.iter().all(|split| is_sqlite(&split.path))
@@ -123,8 +144,8 @@ impl BagReader {
 
     /// The wanted messages in order of log time across all files, with bounded memory.
     ///
-    /// A damaged bag yields what precedes the damage, then the error; a folder without `metadata.yaml`, whose recorder
-    /// was killed, ends without one where its last file is cut. Unknown topics are an error.
+    /// A damaged bag yields what precedes the damage, then the error. A file that is cut ends without one in a folder
+    /// without `metadata.yaml`, whose recorder was killed, and after [`BagReader::past_cut`]. Unknown topics are an error.
     pub fn messages(&self, options: &ReadOptions) -> Result<Messages, BagError> {
         let names = options.topics.as_deref();
         self.expect_topics(names.unwrap_or_default())?;
@@ -139,7 +160,7 @@ impl BagReader {
 
     pub(crate) fn filtered(&self, filter: Filter) -> Messages {
         let (splits, topics) = (self.splits.clone(), self.topics.clone());
-        Messages::new(splits, topics, filter, self.compression, self.unfinished)
+        Messages::new(splits, topics, filter, self.compression, self.past_cut)
     }
 
     /// Refuses names of topics that the bag lacks.
@@ -236,7 +257,7 @@ impl BagReader {
             topics: topics.into(),
             splits: splits.into(),
             compression,
-            unfinished: false,
+            past_cut: false,
         })
     }
 }

@@ -1,6 +1,6 @@
 //! A damaged bag as a sound one: all that can be read of it, and what is lost.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs;
 use std::path::Path;
 
@@ -21,9 +21,12 @@ const MAX_TOLD: usize = 100;
 pub struct Recovered {
     /// Messages of the new bag.
     pub messages: u64,
-    /// Messages that the index or the metadata of the damaged one count, where either can be read; what
-    /// they claim is not checked.
+    /// Those among them that come from stretches of MCAP whose checksum is wrong; some may be altered.
+    pub unchecked: Vec<Unchecked>,
+    /// Messages that the damaged one held, by `metadata.yaml` or an index, where either can be read.
     pub claimed: Option<u64>,
+    /// Messages of those that the new bag lacks; nothing where none of them are counted.
+    pub lost: Option<u64>,
     /// Messages that were read and that no bag can hold.
     pub refused: u64,
     /// Damages, the first hundred in words.
@@ -32,19 +35,33 @@ pub struct Recovered {
     pub told: Vec<String>,
 }
 
+/// Unchecked messages of one topic.
+#[derive(Clone, Debug, Serialize)]
+pub struct Unchecked {
+    /// Name of the topic.
+    pub topic: String,
+    /// Log times of the messages, ns since the Unix epoch.
+    pub log_times_ns: Vec<i64>,
+}
+
 impl Recovered {
-    fn damage(&mut self, damage: impl ToString) {
+    /// True if nothing can be read of a bag that is damaged.
+    pub fn is_nothing(&self) -> bool {
+        self.messages == 0 && (self.damages > 0 || self.refused > 0 || self.claimed > Some(0))
+    }
+
+    fn damage(&mut self, damage: &BagError) {
         self.damages += 1;
         if self.told.len() < MAX_TOLD {
-            self.told.push(damage.to_string());
+            self.told.push(damage.cause());
         }
     }
 }
 
 /// Writes what can be read of a bag as another one at `out`, which must not be there yet.
 ///
-/// Chunks of MCAP and rows of SQLite that are damaged are left out; of SQLite whose pages are, what precedes
-/// the damage is read.
+/// Rows of SQLite are read one by one behind damage. Of chunks of MCAP whose checksum is wrong, the messages
+/// that can be told apart are taken unless they are compressed. Of nothing no bag is made.
 pub fn recover(bag: &Path, out: &Path) -> Result<Recovered, BagError> {
     let mut recovered = Recovered::default();
     let readers = readers(bag, &mut recovered)?;
@@ -54,6 +71,7 @@ pub fn recover(bag: &Path, out: &Path) -> Result<Recovered, BagError> {
     };
     let mut writer = BagWriter::create(out, storage, WriterOptions::default())?;
     let mut known = HashMap::new();
+    let mut unchecked: BTreeMap<String, Vec<i64>> = BTreeMap::new();
     for reader in &readers {
         let mut place = |topic: &TopicInfo| add(&mut writer, &mut known, topic);
         let places: Vec<Result<usize, BagError>> = reader.topics().iter().map(&mut place).collect();
@@ -64,11 +82,12 @@ pub fn recover(bag: &Path, out: &Path) -> Result<Recovered, BagError> {
             past_damage: true,
             ..ReadOptions::default()
         };
-        for message in reader.messages(&options)? {
+        let mut messages = reader.messages(&options)?;
+        while let Some(message) = messages.next() {
             let message = match message {
                 Ok(message) => message,
                 Err(damage) => {
-                    recovered.damage(damage);
+                    recovered.damage(&damage);
                     continue;
                 }
             };
@@ -78,13 +97,35 @@ pub fn recover(bag: &Path, out: &Path) -> Result<Recovered, BagError> {
             };
             match writer.write(*topic, message.log_time_ns, &message.data) {
                 Ok(()) => recovered.messages += 1,
-                Err(BagError::Invalid { .. }) => recovered.refused += 1,
+                Err(BagError::Invalid { .. }) => {
+                    recovered.refused += 1;
+                    continue;
+                }
                 Err(error) => return Err(error),
+            }
+            if messages.is_unchecked()
+                && let Some(topic) = reader.topics().get(message.topic)
+            {
+                let times = unchecked.entry(topic.name.clone()).or_default();
+                times.push(message.log_time_ns);
             }
         }
         recovered.refused += reader.implausible_rows();
     }
+    let listed = unchecked.into_iter();
+    recovered.unchecked = listed
+        .map(|(topic, log_times_ns)| Unchecked {
+            topic,
+            log_times_ns,
+        })
+        .collect();
+    let claimed = recovered.claimed;
+    let lost = claimed.and_then(|claimed| claimed.checked_sub(recovered.messages));
+    recovered.lost = lost.or((recovered.damages == 0).then_some(0));
     writer.finish()?;
+    if recovered.is_nothing() {
+        fs::remove_dir_all(out).map_err(BagError::io(out, "remove"))?;
+    }
     Ok(recovered)
 }
 
@@ -94,7 +135,7 @@ fn readers(bag: &Path, recovered: &mut Recovered) -> Result<Vec<BagReader>, BagE
     recovered.claimed = metadata.map(|metadata| metadata.message_count);
     let whole = match BagReader::open(bag) {
         Ok(reader) => {
-            recovered.claimed = recovered.claimed.max(Some(reader.message_count()));
+            recovered.claimed = recovered.claimed.max(reader.claimed());
             return Ok(vec![reader]);
         }
         Err(error) if !fs::metadata(bag).is_ok_and(|found| found.is_dir()) => return Err(error),
@@ -113,12 +154,16 @@ fn readers(bag: &Path, recovered: &mut Recovered) -> Result<Vec<BagReader>, BagE
     for file in files {
         match BagReader::open(&file) {
             Ok(reader) => readers.push(reader),
-            Err(error) => recovered.damage(error),
+            Err(error) => recovered.damage(&error),
         }
     }
     match readers.is_empty() {
         true => Err(whole),
-        false => Ok(readers),
+        false => {
+            let counted = readers.iter().map(BagReader::claimed).sum();
+            recovered.claimed = recovered.claimed.max(counted);
+            Ok(readers)
+        }
     }
 }
 

@@ -8,7 +8,8 @@ use super::BagError;
 pub(crate) const MCAP_MAGIC: &[u8] = mcap::MAGIC;
 /// The magic of a zstd frame.
 pub(crate) const ZSTD_MAGIC: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
-const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
+/// The magic of a SQLite database.
+pub(crate) const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
 
 /// The kinds of file that a bag may hold.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -52,12 +53,23 @@ const FOREIGN: &[(&[u8], &str, &str)] = &[
 ];
 
 /// Identifies the file at `path`, or says what else it is.
+///
+/// Of unknown first bytes, which damage may have changed, the name counts.
 pub(crate) fn identify(path: &Path) -> Result<FileKind, BagError> {
     let mut head = Vec::new();
     let file = File::open(path).map_err(BagError::io(path, "open"))?;
     file.take(64)
         .read_to_end(&mut head)
         .map_err(BagError::io(path, "read"))?;
+    let name = path.to_string_lossy();
+    let named = match (name.ends_with(".mcap"), name.ends_with(".db3")) {
+        (true, _) => Some(FileKind::Mcap),
+        (_, true) => Some(FileKind::Sqlite3),
+        _ => None,
+    };
+    if let Some(kind) = named.filter(|_| is_unknown(&head)) {
+        return Ok(kind);
+    }
     identify_bytes(&head).map_err(|(found, remedy)| match found.as_str() {
         "cut" => BagError::Truncated {
             path: path.to_path_buf(),
@@ -71,6 +83,16 @@ pub(crate) fn identify(path: &Path) -> Result<FileKind, BagError> {
             remedy,
         },
     })
+}
+
+/// True for bytes that neither a kind of file nor a text begins with.
+fn is_unknown(head: &[u8]) -> bool {
+    let kinds = [MCAP_MAGIC, SQLITE_MAGIC, ZSTD_MAGIC].into_iter();
+    let is_kind = |magic: &[u8]| head.starts_with(magic) || magic.starts_with(head);
+    !kinds.chain(FOREIGN.iter().map(|f| f.0)).any(is_kind)
+        && !head
+            .iter()
+            .all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace())
 }
 
 fn identify_bytes(head: &[u8]) -> Result<FileKind, (String, &'static str)> {

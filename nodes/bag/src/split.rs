@@ -47,6 +47,14 @@ impl OpenFile {
         }
     }
 
+    /// Messages that the file held, by its own count; nothing where that is damaged.
+    pub(crate) fn claimed(&self) -> Option<u64> {
+        match self {
+            OpenFile::Mcap(file) => file.claimed,
+            OpenFile::Sqlite(file) => file.claimed(),
+        }
+    }
+
     fn stream(&self, filter: Filter) -> Result<StorageStream, BagError> {
         match self {
             OpenFile::Mcap(file) => file.stream(filter),

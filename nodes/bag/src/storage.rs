@@ -21,6 +21,8 @@ pub(crate) struct StorageMessage {
     /// Index into the file's topics.
     pub topic: usize,
     pub log_time_ns: i64,
+    /// True of a damaged stretch: its checksum is wrong, or there is none.
+    pub unchecked: bool,
     pub data: Vec<u8>,
 }
 

@@ -85,6 +85,10 @@ enum Command {
 /// Runs a node if the program was called by its name, the command line otherwise. Errors are one line
 /// on standard error and a non-zero status.
 fn main() -> ExitCode {
+    // A limit of file sizes (`ulimit -f`) is an error of the write, as a full disk is.
+    if let Err(error) = lattice_runtime::catch_file_size_signal() {
+        eprintln!("lattice: SIGXFSZ cannot be caught: {error}");
+    }
     let node = node::called_as(std::env::args_os().next());
     let result = match &node {
         Some(name) => node::run(name, std::env::args().skip(1)),

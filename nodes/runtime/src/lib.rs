@@ -61,7 +61,7 @@ pub use publisher::{Publisher, RawPublisher};
 pub use remote::{GraphRole, RemotePublisher};
 pub use service::{Reply, Server};
 pub use shared::{CallError, Client};
-pub use shutdown::Shutdown;
+pub use shutdown::{Shutdown, catch_file_size_signal};
 pub use subscription::{Load, Losses, Subscription, Undecoded};
 pub use sync::lock;
 pub use task_thread::guarded;

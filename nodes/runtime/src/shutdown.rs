@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock, Mutex};
 use std::time::{Duration, Instant};
 
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag::register_conditional_default;
 use signal_hook::iterator::{Handle, Signals};
 use signal_hook::low_level::emulate_default_handler;
@@ -13,6 +13,11 @@ use smol::Timer;
 use smol::future::{block_on, or};
 
 use super::sync::{Changed, lock};
+
+/// Keeps a write beyond the limit of file sizes (`ulimit -f`) from ending the process: it is an error of the write.
+pub fn catch_file_size_signal() -> std::io::Result<()> {
+    signal_hook::flag::register(SIGXFSZ, Arc::default()).map(drop)
+}
 
 /// A request to end that a runtime, its nodes and signals share. Clones are the same request.
 #[derive(Clone, Default)]

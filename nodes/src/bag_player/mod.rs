@@ -82,7 +82,7 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     if bag.is_empty() {
         return Err("which log? Give it as `--ros-args -p bag:=DIRECTORY`".into());
     }
-    let reader = BagReader::open(&PathBuf::from(&bag))?;
+    let reader = BagReader::open(&PathBuf::from(&bag))?.past_cut();
     let span_ns = (reader.start_ns().unwrap_or(0), reader.end_ns().unwrap_or(0));
     let has_clock = player.clock_hz.is_some();
     let player = Player::new(reader, player)?;

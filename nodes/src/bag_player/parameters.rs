@@ -1,5 +1,6 @@
 //! All parameters of the player.
 
+use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use crate::{options, report};
@@ -64,13 +65,16 @@ impl Settings {
     }
 }
 
+/// Times in a log that the player takes, seconds.
+const SECONDS: RangeInclusive<f64> = 0.0..=1e9;
+
 fn player_options(params: &Params) -> Result<PlayerOptions, ParamError> {
-    let duration_s = params.f64("duration_s", 0.0)?;
+    let duration_s = params.f64_in("duration_s", 0.0, SECONDS)?;
     let include = params.string_array("topics", &[])?;
-    let clock_hz = params.f64("clock_hz", 0.0)?;
+    let clock_hz = params.f64_in("clock_hz", 0.0, 0.0..=1e4)?;
     Ok(PlayerOptions {
         rate: params.f64_in("rate", 1.0, 1e-3..=1e3)?,
-        start_offset_s: params.f64("start_offset_s", 0.0)?,
+        start_offset_s: params.f64_in("start_offset_s", 0.0, SECONDS)?,
         duration_s: (duration_s > 0.0).then_some(duration_s),
         loop_: params.bool("loop", false)?,
         include: (!include.is_empty()).then_some(include),

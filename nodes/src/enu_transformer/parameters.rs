@@ -9,7 +9,7 @@ use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
-    "points_topics" fixed(TOPIC): "Topics of the sensors' clouds (sensor_msgs/PointCloud2); any number.";
+    "points_topics" fixed(TOPIC): "Topics of the sensors' clouds (sensor_msgs/PointCloud2); at least one.";
     "ins.source" fixed(TOPIC): "inspva, inspvax, navsatfix_imu, odometry, pose, pose_with_covariance, or tf: transforms from map_frame to base_frame that others publish.";
     "ins.topic" fixed(TOPIC): "Topic of the INS; for navsatfix_imu that of the NavSatFix.";
     "ins.imu_topic" fixed(TOPIC): "Topic of the attitude, for navsatfix_imu.";
@@ -68,13 +68,17 @@ impl Settings {
         params.describe(ABOUT);
         params.describe(options::COMMON);
         let transformer = TransformerOptions::from_params(params)?;
+        let points_topics = params.string_array("points_topics", &["points"])?;
+        if points_topics.iter().all(String::is_empty) {
+            return Err(params.invalid("points_topics", "expected at least one topic"));
+        }
         Ok(Self {
             limits: ComputeLimits {
                 events: options::inbox_events(params, 8192)?,
                 bytes: transformer.max_waiting_bytes,
                 threads: options::threads(params, 0)?,
             },
-            points_topics: params.string_array("points_topics", &["points"])?,
+            points_topics,
             ins_topic: params.string("ins.topic", "ins")?,
             imu_topic: params.string("ins.imu_topic", "imu")?,
             report_file: report::file(params)?,

@@ -6,6 +6,7 @@
 //! | `-p NAME:=VALUE` | no node of the process knows NAME |
 //! | NAME in a section with a wildcard (`/**`) | no node of Lattice knows NAME; a warning where the file is shared |
 //! | a section or rule of a node that Lattice does not have | its name is a misspelling of one that it has |
+//! | a file | all its sections are of nodes that Lattice does not have |
 //! | sections of a node, all of other namespaces | always; a warning where the file is shared |
 //!
 //! Sections of other packages' nodes are left alone. Which names a node knows is in [`Params::unknown`].
@@ -15,6 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::PARAMETERS;
 use crate::start::{Declare, NodeError};
 use lattice_runtime::params::{Addressed, Params, Unknown, addressed, is_near};
+use lattice_runtime::params_file;
 use lattice_runtime::ros_args::RosArgs;
 
 /// Nodes of Lattice that are not in [`PARAMETERS`]: those of bags, and that of `lattice run` itself.
@@ -54,6 +56,7 @@ pub fn check_names(args: &RosArgs, nodes: &[NamedNode<'_>], files: Files) -> Res
     }
     let names: Vec<String> = nodes.iter().map(|(name, _)| args.node_name(name)).collect();
     check_nodes(&addressed, &names, files)?;
+    check_files(args, &names)?;
     for node in &read {
         node.check_namespace(&addressed, files)?;
         node.check_named()?;
@@ -155,6 +158,24 @@ fn check_nodes(
     }
     if files == Files::Own && !others.is_empty() {
         log::info!("not for nodes of Lattice: {}", others.join(", "));
+    }
+    Ok(())
+}
+
+/// Refuses files of which no section is for a node of Lattice.
+fn check_files(args: &RosArgs, names: &[String]) -> Result<(), NodeError> {
+    let ours = PARAMETERS.iter().map(|(name, _)| *name).chain(OTHER_NODES);
+    let ours: BTreeSet<&str> = ours.chain(names.iter().map(String::as_str)).collect();
+    for path in args.params_files() {
+        let entries = params_file::read(path)?;
+        let nodes: Option<BTreeSet<&str>> = entries.iter().map(|of| of.nodes.name()).collect();
+        let Some(nodes) = nodes.filter(|nodes| !nodes.is_empty() && nodes.is_disjoint(&ours))
+        else {
+            continue;
+        };
+        let nodes = Vec::from_iter(nodes).join(", ");
+        let (path, names) = (path.display(), names.join(", "));
+        return Err(format!("{path} is for {nodes}, expected {names} or `/**`").into());
     }
     Ok(())
 }
@@ -312,8 +333,18 @@ mod tests {
             "/r/*/ekf_node",
         ];
         for files in [Files::Shared, Files::Own] {
-            let all: String = others.iter().map(|of| section(of, "latice: 1")).collect();
-            assert_eq!(checked(ONE, files, &all, &[]), Ok(()));
+            let foreign: String = others.iter().map(|of| section(of, "latice: 1")).collect();
+            let error = checked(ONE, files, &foreign, &[]).unwrap_err();
+            assert!(error.contains("is for amcl, "), "{error}");
+            assert!(
+                error.ends_with("expected lattice_mapper or `/**`"),
+                "{error}"
+            );
+            for ours in ["/**", "enu_transformer", "/**/lattice_mapper"] {
+                let all = foreign.clone() + &section(ours, "use_sim_time: true");
+                assert_eq!(checked(ONE, files, &all, &[]), Ok(()), "{ours}");
+            }
+            let all = foreign;
             let wrong = section("/**/latice_mapper", "lattice: bcc");
             let error = checked(ONE, files, &(all + &wrong), &[]).unwrap_err();
             assert!(error.starts_with("`/**/latice_mapper` in /"), "{error}");

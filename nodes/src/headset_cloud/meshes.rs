@@ -55,7 +55,7 @@ impl HeadsetCloud {
 
     /// Takes the session of the headset: another one than before means another origin.
     pub fn on_session(&mut self, text: &str) {
-        match self.session.on_topic(text) {
+        match self.session.on_topic(text, self.now_ns) {
             Told::Same | Told::First => {}
             Told::Another => self.begin_session(),
             Told::Ended => self.refuse("session", "malformed", "its text is too long"),
@@ -68,8 +68,7 @@ impl HeadsetCloud {
         outputs: &mut Vec<HeadsetOutput>,
     ) -> Result<Change, MeshRefusal> {
         self.surfaces.check(message)?;
-        let stamp_ns = message.header.stamp.to_ns();
-        let told = self.session.on_mesh(&message.session, stamp_ns);
+        let told = self.session.on_mesh(&message.session, self.now_ns);
         if told == Told::Ended {
             return Err(MeshRefusal::OtherSession {
                 surface: shown(&message.surface),

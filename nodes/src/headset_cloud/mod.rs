@@ -63,6 +63,8 @@ pub struct HeadsetCloud {
     /// Stamp of the newest change of the mesh that no cloud was made of.
     changed_ns: Option<i64>,
     session: Session,
+    /// Time of arrival of what comes next, ns of the node's clock.
+    now_ns: i64,
     poses: Poses,
     waiting: Waiting,
     info: Option<Arc<CameraInfo>>,
@@ -83,6 +85,7 @@ impl HeadsetCloud {
             room: None,
             changed_ns: None,
             session: Session::default(),
+            now_ns: 0,
             poses: Poses::new(&options),
             waiting: Waiting::default(),
             info: None,
@@ -107,6 +110,11 @@ impl HeadsetCloud {
             out.extend(self.on_camera_info(info));
         }
         out
+    }
+
+    /// Sets the time of arrival of what comes next, ns of a clock that is never set.
+    pub fn at(&mut self, now_ns: i64) {
+        self.now_ns = now_ns;
     }
 
     /// Takes an image.

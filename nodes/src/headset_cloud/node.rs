@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::headset::HeadsetMesh;
@@ -64,7 +64,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         taken.map_err(|problem| params.invalid("mesh_file", problem))?;
     }
     let ready = match &settings.network {
-        Some((network, options)) => Some(LoadedNetwork::new(params, network, options.clone())?),
+        Some((network, options)) => Some(LoadedNetwork::new(
+            params,
+            network,
+            options.clone(),
+            &runtime.shutdown_handle(),
+        )?),
         None => None,
     };
     let (lost, losses) = (Arc::new(AtomicU64::new(0)), Losses::default());
@@ -78,6 +83,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         lost: Arc::clone(&lost),
         losses: losses.clone(),
         warnings: Throttle::new(Duration::from_secs(5)),
+        begin: Instant::now(),
         warned: 0,
         report_file: settings.report_file.clone(),
     };
@@ -193,6 +199,8 @@ struct Shell {
     lost: Arc<AtomicU64>,
     losses: Losses,
     warnings: Throttle,
+    /// Start of the node.
+    begin: Instant,
     /// Messages dropped when there was a warning last.
     warned: u64,
     report_file: String,
@@ -201,6 +209,8 @@ struct Shell {
 impl Shell {
     fn on(&mut self, event: Event) {
         let machine = &mut self.machine;
+        let elapsed = self.begin.elapsed().as_nanos();
+        machine.at(i64::try_from(elapsed).unwrap_or(i64::MAX));
         let outputs = match event {
             Event::Mesh(mesh) => machine.on_mesh(&mesh),
             Event::Marker(marker) => machine.on_marker(&marker),

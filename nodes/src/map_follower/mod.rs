@@ -43,6 +43,8 @@ pub struct MapFollower {
     differences: u64,
     /// Old updates in a row.
     old_updates: u32,
+    /// Stamp of the keyframe that the map is at, until an update follows it.
+    keyframe_ns: Option<i64>,
     /// Newest sequence of any message of the epoch.
     newest: u64,
     staging: Option<Staging>,
@@ -69,6 +71,7 @@ impl MapFollower {
             history: History::default(),
             differences: 0,
             old_updates: 0,
+            keyframe_ns: None,
             newest: 0,
             staging: None,
             open_updates: BTreeMap::new(),
@@ -192,7 +195,10 @@ impl MapFollower {
             // One of the same number and other content, or many in a row, of which none can be new:
             // somebody else has taken the map to where it is.
             self.old_updates += 1;
-            let is_other = message.sequence == at && history != self.history;
+            // So is a later one than the keyframe that it is said to precede.
+            let stamp_ns = message.header.stamp.to_ns();
+            let is_other = message.sequence == at && history != self.history
+                || self.keyframe_ns.is_some_and(|at_ns| stamp_ns > at_ns);
             return Ok(match is_other || self.old_updates > MAX_OLD_UPDATES {
                 true => self.differ("an update of another history"),
                 false => Followed::Old,
@@ -279,6 +285,7 @@ impl MapFollower {
         self.differences += 1;
         log::warn!("the map differs from its mapper's ({why}): it is asked for again");
         self.sequence = None;
+        self.keyframe_ns = None;
         self.newest = 0;
         self.old_updates = 0;
         self.staging = None;
@@ -303,6 +310,7 @@ impl MapFollower {
             if sequence <= *at {
                 continue;
             }
+            self.keyframe_ns = None;
             self.history = self.history.then(sequence, open.sum);
             *at = sequence;
             if self.history != open.history {
@@ -367,6 +375,7 @@ impl MapFollower {
         map.replace(done.voxels, &mut self.touched);
         self.before = None;
         if self.sequence.is_none_or(|at| done.sequence > at) {
+            self.keyframe_ns = Some(map.stamp_ns);
             (self.sequence, self.history) = (Some(done.sequence), done.history);
         }
         self.keyframe_needed = false;

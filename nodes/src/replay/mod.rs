@@ -123,6 +123,7 @@ impl Pipeline {
                 .origin
                 .map(|at| [at.latitude, at.longitude, at.altitude]),
             implausible_rows: 0,
+            cuts: Vec::new(),
             choices: Vec::new(),
             wall_s: 0.0,
         }
@@ -303,6 +304,7 @@ pub fn run(
         source: source.to_owned(),
         clouds_in_log: if whole { plan.clouds(bag) } else { clouds },
         implausible_rows: bag.implausible_rows(),
+        cuts: bag.cuts(),
         choices: plan.choices.clone(),
         wall_s: begin.elapsed().as_secs_f64(),
         ..pipeline.finish()

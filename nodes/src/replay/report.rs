@@ -42,6 +42,9 @@ pub struct RunReport {
     /// Rows of the log that are no messages and were left out.
     #[serde(default)]
     pub implausible_rows: u64,
+    /// Files of the log that end early, each with the number of its messages.
+    #[serde(default)]
+    pub cuts: Vec<String>,
     /// Topics that were taken for clouds, poses and transforms, and those that were not, with the reason.
     #[serde(default)]
     pub choices: Vec<String>,
@@ -105,6 +108,7 @@ impl RunReport {
             } = refusal;
             lines.push(format!("{count} on {topic} ({reason}): {text}"));
         }
+        lines.extend(self.cuts.iter().cloned());
         if self.implausible_rows > 0 {
             let rows = self.implausible_rows;
             lines.push(format!("{rows} rows of the log are no messages"));
@@ -234,6 +238,7 @@ mod tests {
             }],
             origin: None,
             implausible_rows: 0,
+            cuts: Vec::new(),
             choices: Vec::new(),
             wall_s: 1.0,
         };

@@ -5,6 +5,9 @@ use tract_onnx::pb::{AttributeProto, GraphProto, ModelProto, NodeProto, TensorPr
 
 /// Most values of a tensor: 1 GiB of floats.
 pub(super) const MAX_TENSOR_VALUES: usize = 1 << 28;
+/// Most operators of a graph. Published networks of segmentation have up to 3000; the time to prepare them grows
+/// with the square.
+const MAX_OPERATORS: usize = 4000;
 /// Most letters of a file that are shown.
 const SHOWN: usize = 160;
 
@@ -41,6 +44,12 @@ fn graph(
     known: &impl Fn(&str) -> bool,
     unknown: &mut Vec<String>,
 ) -> Result<(), String> {
+    let operators = graph.node.len();
+    if operators > MAX_OPERATORS {
+        return Err(format!(
+            "{operators} operators, at most {MAX_OPERATORS} are read"
+        ));
+    }
     for given in &graph.initializer {
         tensor(given)?;
     }
@@ -157,4 +166,25 @@ fn made(node: &NodeProto, graph: &GraphProto) -> Result<(), String> {
         .map(|dim| if dim == -1 { 1 } else { dim })
         .collect();
     bounded(&node.name, &dims).map(drop)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn graphs_of_too_many_operators_are_refused() {
+        let of = |operators: usize| ModelProto {
+            graph: Some(GraphProto {
+                node: vec![NodeProto::default(); operators],
+                ..GraphProto::default()
+            }),
+            ..ModelProto::default()
+        };
+        assert_eq!(model(&of(MAX_OPERATORS), |_| true), Ok(()));
+        for operators in [MAX_OPERATORS + 1, 5000, 100_000] {
+            let error = model(&of(operators), |_| true).unwrap_err();
+            assert!(error.contains(&operators.to_string()), "{error}");
+        }
+    }
 }

@@ -1,9 +1,10 @@
 //! Models as files: what every backend reads and checks of them.
 
 use std::fs::File;
-use std::io::{Cursor, Read};
+use std::io::{self, Cursor, Read};
 use std::path::Path;
 
+use rustix::fs::{Mode, OFlags};
 use tract_onnx::Onnx;
 use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::Framework;
@@ -15,13 +16,27 @@ use super::network::{ModelError, Network, Size, Values};
 /// Largest model that is read, bytes: the format holds no more than 2 GiB.
 const MAX_MODEL_BYTES: u64 = 1 << 30;
 
+/// Opens a regular file: of a pipe or a device nobody knows when it answers.
+pub(super) fn open(path: &Path) -> io::Result<File> {
+    // Without waiting for the writer of a pipe.
+    let flags = OFlags::RDONLY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+    let file = File::from(rustix::fs::open(path, flags, Mode::empty())?);
+    match file.metadata()?.is_file() {
+        true => Ok(file),
+        false => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "not a regular file",
+        )),
+    }
+}
+
 /// Bytes of a model's file.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, ModelError> {
     let on_error = |error| ModelError::File {
         path: path.to_owned(),
         error,
     };
-    let file = File::open(path).map_err(on_error)?;
+    let file = open(path).map_err(on_error)?;
     let bytes = file.metadata().map_err(on_error)?.len();
     if bytes > MAX_MODEL_BYTES {
         return Err(ModelError::Large {
@@ -105,4 +120,32 @@ pub(super) fn other_output(kind: impl std::fmt::Debug, shape: impl std::fmt::Deb
         "its output is {kind:?} of {shape:?}, expected scores of 1 x classes x rows x columns or whole numbers of 1 x \
          rows x columns"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_are_regular_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let fifo = folder.path().join("fifo.onnx");
+        let made = std::process::Command::new("mkfifo").arg(&fifo).status();
+        assert!(made.unwrap().success());
+        let link = folder.path().join("link.onnx");
+        std::os::unix::fs::symlink(&fifo, &link).unwrap();
+        // Each would wait, or never end.
+        for path in [
+            fifo.as_path(),
+            link.as_path(),
+            Path::new("/dev/zero"),
+            folder.path(),
+        ] {
+            let error = read(path).unwrap_err().to_string();
+            assert!(error.contains("not a regular file"), "{error}");
+        }
+        let file = folder.path().join("model.onnx");
+        std::fs::write(&file, "x").unwrap();
+        assert_eq!(read(&file).unwrap(), b"x");
+    }
 }

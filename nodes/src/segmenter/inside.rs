@@ -27,8 +27,9 @@ impl LoadedNetwork {
         params: &Params,
         settings: &NetworkSettings,
         options: SegmenterOptions,
+        shutdown: &Shutdown,
     ) -> Result<Self, ParamError> {
-        let segmenter = Segmenter::new(options, settings.read(params)?);
+        let segmenter = Segmenter::new(options, settings.read(params, shutdown)?);
         let view = WorkerState::new(&segmenter, 0.0);
         let view = NetworkView(Arc::new(Mutex::new(view)));
         Ok(Self { segmenter, view })

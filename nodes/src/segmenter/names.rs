@@ -1,7 +1,6 @@
 //! Names of the classes of a model: its metadata, or the configuration beside it.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -75,7 +74,7 @@ struct Config {
 }
 
 fn beside(path: &Path) -> Result<Vec<String>, String> {
-    let Ok(file) = File::open(path) else {
+    let Ok(file) = super::file::open(path) else {
         return Ok(Vec::new());
     };
     let mut text = String::new();

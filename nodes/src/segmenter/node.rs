@@ -34,7 +34,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let Some(network) = &settings.network else {
         return Err(params.invalid("model", "expected an ONNX file").into());
     };
-    let network = network.read(params)?;
+    let network = network.read(params, &runtime.shutdown_handle())?;
     let (slot, losses) = (Arc::new(Slot::default()), Losses::default());
     let shell = Shell {
         machine: Segmenter::new(settings.segmenter, network),

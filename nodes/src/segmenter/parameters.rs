@@ -1,15 +1,17 @@
 //! All parameters of the node.
 
 use std::path::PathBuf;
-use std::time::Instant;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use super::network::{Backend, ModelError, Network, Size};
 use super::options::input_size;
 use super::{SegmenterOptions, read_network_by};
 use crate::compute::ComputeLimits;
 use crate::{options, report};
-use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
+use lattice_runtime::{Shutdown, about};
 
 const MODEL: &str = "the network is made at the start";
 const ABOUT: &[About] = about! {
@@ -30,6 +32,44 @@ pub(crate) const NETWORK: &[About] = about! {
     "label_probs": "Whether points have label_probs, the probabilities of the four best classes of their pixel, with model.";
     "compressed_color" fixed(options::TOPIC): "Whether images of colours are taken packed (JPEG), from the topic with /compressed behind its name.";
 };
+
+/// Longest time in which a network is made ready: that of the largest published ones is a tenth.
+const MAX_LOAD: Duration = Duration::from_secs(60);
+/// Time between two looks at the request to end.
+const POLL: Duration = Duration::from_millis(50);
+
+/// Result of `make`, on a thread of its own that is left alone if it does not end in time or the process is to.
+fn within<T: Send + 'static>(
+    most: Duration,
+    shutdown: &Shutdown,
+    make: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, String> {
+    let (done, made) = channel();
+    let thread = thread::Builder::new().name("read network".to_owned());
+    thread
+        .spawn(move || {
+            // Nobody may wait for it any more.
+            let _ = done.send(make());
+        })
+        .map_err(|error| error.to_string())?;
+    let begin = Instant::now();
+    loop {
+        match made.recv_timeout(POLL) {
+            Ok(made) => return Ok(made),
+            Err(RecvTimeoutError::Disconnected) => return Err("it cannot be read".to_owned()),
+            Err(RecvTimeoutError::Timeout) if shutdown.is_requested() => {
+                return Err("reading it was interrupted".to_owned());
+            }
+            Err(RecvTimeoutError::Timeout) if begin.elapsed() > most => {
+                let seconds = most.as_secs_f64();
+                return Err(format!(
+                    "it is not ready after {seconds} s: take a smaller one"
+                ));
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+    }
+}
 
 /// A network by its parameters.
 #[derive(Clone)]
@@ -53,8 +93,12 @@ impl NetworkSettings {
         Ok(Some(found).filter(|found| !found.model.as_os_str().is_empty()))
     }
 
-    /// Makes the network, which takes a moment.
-    pub(crate) fn read(&self, params: &Params) -> Result<Box<dyn Network>, ParamError> {
+    /// Makes the network within [`MAX_LOAD`], or until the process is to end.
+    pub(crate) fn read(
+        &self,
+        params: &Params,
+        shutdown: &Shutdown,
+    ) -> Result<Box<dyn Network>, ParamError> {
         let threads = match self.threads {
             0 => {
                 let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -63,7 +107,17 @@ impl NetworkSettings {
             threads => threads,
         };
         let began = Instant::now();
-        let found = read_network_by(self.backend, &self.model, self.input_size, threads);
+        let Self {
+            backend,
+            model,
+            input_size,
+            ..
+        } = self.clone();
+        let read = move || read_network_by(backend, &model, input_size, threads);
+        let found = within(MAX_LOAD, shutdown, read).map_err(|problem| {
+            let model = self.model.display();
+            params.invalid("model", format!("{model}: {problem}"))
+        })?;
         let network = found.map_err(|error| {
             let name = match error {
                 ModelError::Library(_) | ModelError::NotBuilt("ort") => "backend",
@@ -118,4 +172,28 @@ impl Settings {
 /// Reads all parameters of the node, as its start does.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_takes_too_long_is_left_and_a_request_to_end_is_heard() {
+        let shutdown = Shutdown::default();
+        assert_eq!(within(MAX_LOAD, &shutdown, || 7), Ok(7));
+        let late = |shutdown: &Shutdown, most| {
+            let begin = Instant::now();
+            let (never, wait) = channel::<()>();
+            let error = within(most, shutdown, move || wait.recv()).unwrap_err();
+            drop(never);
+            assert!(begin.elapsed() < Duration::from_secs(2), "{error}");
+            error
+        };
+        assert!(late(&shutdown, Duration::from_millis(1)).contains("not ready"));
+        let panics = within(MAX_LOAD, &shutdown, || -> u8 { panic!("on purpose") });
+        assert!(panics.is_err());
+        shutdown.request();
+        assert!(late(&shutdown, MAX_LOAD).contains("interrupted"));
+    }
 }

@@ -46,7 +46,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let settings = Settings::from_params(params)?;
     let (lost, losses) = (Arc::new(AtomicU64::new(0)), Losses::default());
     let ready = match &settings.network {
-        Some((network, options)) => Some(LoadedNetwork::new(params, network, options.clone())?),
+        Some((network, options)) => Some(LoadedNetwork::new(
+            params,
+            network,
+            options.clone(),
+            &runtime.shutdown_handle(),
+        )?),
         None => None,
     };
     let view = ready.as_ref().map(LoadedNetwork::view);

@@ -12,7 +12,7 @@ mod shape;
 pub use options::{ColorBy, MarkerOptions, MarkerStyle};
 pub use parameters::declare;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use lattice_msgs::cdr;
 use lattice_msgs::geometry_msgs::Pose;
@@ -53,7 +53,8 @@ pub struct MarkerReport {
     pub counts: MarkerCounts,
     /// Voxels of the map that it followed.
     pub voxels: usize,
-    /// Bytes of all current markers as CDR: what a viewer that joins now receives.
+    /// Bytes of all current markers: what a viewer that joins now receives. The node counts them as it draws, rounded
+    /// up.
     pub marker_bytes: usize,
     /// Bytes given out over the whole run.
     pub published_bytes: u64,
@@ -76,6 +77,8 @@ pub struct VoxelMarkers {
     follower: MapFollower,
     blocks: Blocks,
     dirty: BTreeSet<BlockId>,
+    /// Bytes of the markers of each block as they were drawn last.
+    drawn: BTreeMap<BlockId, usize>,
     wipe: bool,
     style: MarkerStyle,
     counts: MarkerCounts,
@@ -93,6 +96,7 @@ impl VoxelMarkers {
             follower: MapFollower::new(options.max_voxels),
             blocks: Blocks::new(options.block_bits),
             dirty: BTreeSet::new(),
+            drawn: BTreeMap::new(),
             wipe: true,
             style: options.style,
             counts: MarkerCounts::default(),
@@ -111,11 +115,17 @@ impl VoxelMarkers {
         bytes
     }
 
+    /// Bytes of all markers as they were drawn last, rounded up.
+    pub fn drawn_bytes(&self) -> usize {
+        self.drawn.values().sum()
+    }
+
     /// Goes on with other options: everything is drawn again.
     pub fn set_options(&mut self, options: MarkerOptions) {
         self.follower.set_max_voxels(options.max_voxels);
         if options.block_bits != self.options.block_bits {
             self.blocks = Blocks::new(options.block_bits);
+            self.drawn.clear();
             if let Some(map) = self.follower.map() {
                 let neighbors = map.lattice.face_neighbors();
                 for key in map.voxels().keys() {
@@ -191,17 +201,23 @@ impl VoxelMarkers {
                 self.counts.markers_deleted += 1;
                 packer.push(bare(&header, id, Marker::DELETE), &mut arrays);
             }
+            let mut drawn = 0;
             for (id, mut marker) in ids.current.into_iter().zip(shapes) {
                 self.counts.markers_added += 1;
                 marker.id = id;
                 marker.ns = NAMESPACE.to_owned();
                 marker.header = header.clone();
+                drawn += marker_bytes(&marker);
                 // RViz keeps the old cubes of a list unless it is deleted first.
                 if marker.type_ == Marker::CUBE_LIST {
                     packer.push(bare(&header, id, Marker::DELETE), &mut arrays);
                 }
                 packer.push(marker, &mut arrays);
             }
+            match drawn {
+                0 => self.drawn.remove(&block),
+                bytes => self.drawn.insert(block, bytes),
+            };
         }
         packer.finish(&mut arrays);
         self.counts.arrays_out += arrays.len() as u64;
@@ -243,6 +259,7 @@ impl VoxelMarkers {
         };
         if replaced {
             self.blocks = Blocks::new(self.options.block_bits);
+            self.drawn.clear();
             self.dirty.clear();
             self.wipe = true;
         }

@@ -1,7 +1,7 @@
 //! The marker publisher as a ROS node: a thin shell around [`VoxelMarkers`].
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::visualization_msgs::MarkerArray;
@@ -16,8 +16,8 @@ use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Level, Publisher, Runtime, Undecoded};
 
-/// Longest wait for readers at the end, between two budgets of markers.
-const FLUSH: Duration = Duration::from_secs(2);
+/// Longest wait for readers at the end.
+const FLUSH: Duration = Duration::from_secs(1);
 
 /// Event for the compute thread.
 enum Event {
@@ -166,20 +166,21 @@ impl Shell {
     }
 
     fn finish(&mut self) {
-        // One budget after another, as fast as viewers take them.
+        // One budget after another, as fast as viewers take them, for a moment.
+        let begin = Instant::now();
         self.draw();
-        while self.markers.flush(FLUSH)
+        while self.markers.flush(FLUSH.saturating_sub(begin.elapsed()))
+            && begin.elapsed() < FLUSH
             && self.markers.subscriber_count() > 0
             && self.machine.is_dirty()
         {
             self.draw();
         }
         let counts = self.machine.counts().clone();
-        self.machine.wipe();
         let report = MarkerReport {
             counts,
             voxels: self.machine.voxels(),
-            marker_bytes: self.machine.take_bytes(),
+            marker_bytes: self.machine.drawn_bytes(),
             published_bytes: self.markers.sent_bytes(),
             arrays_not_published: self.markers.dropped(),
             inbox_full: self.input.losses().inbox_full(),

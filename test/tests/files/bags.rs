@@ -25,7 +25,7 @@ fn run_peer(arguments: &[&str]) -> Option<Value> {
 }
 
 /// The number that the bytes spell, modulo 2^61 - 1; the peer computes it too.
-fn hash(data: &[u8]) -> u64 {
+pub(super) fn hash(data: &[u8]) -> u64 {
     let prime = (1_u128 << 61) - 1;
     let hash = data.iter().fold(1_u128, |hash, byte| {
         (hash * 256 + u128::from(*byte)) % prime

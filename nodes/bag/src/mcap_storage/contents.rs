@@ -29,6 +29,8 @@ pub(super) struct Block {
     pub channels: Option<Box<[u16]>>,
     /// True behind damage.
     pub behind: bool,
+    /// True for messages that were found one by one where the checksum of their chunk is wrong.
+    pub unchecked: bool,
 }
 
 struct Schema {
@@ -67,7 +69,8 @@ pub(super) struct Contents {
     pub blocks: Vec<Block>,
     pub counts: BTreeMap<u16, u64>,
     pub seen: Seen,
-    pub damage: Option<BagError>,
+    /// In order of the file.
+    pub damages: Vec<BagError>,
 }
 
 impl Contents {
@@ -132,7 +135,7 @@ impl Contents {
         }
         let mut info = StorageInfo {
             message_count: self.seen.messages,
-            damage: self.damage.take(),
+            damage: self.damages.first().cloned(),
             ..StorageInfo::default()
         };
         let (mut topic_of, mut places) = (BTreeMap::new(), TopicIndex::default());

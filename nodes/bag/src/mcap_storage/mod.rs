@@ -4,6 +4,7 @@ mod contents;
 mod lengths;
 mod records;
 mod resume;
+mod salvage;
 mod scan;
 mod stream;
 mod summary;
@@ -34,6 +35,9 @@ pub(crate) struct McapFile {
     temporary: Option<Arc<TempPath>>,
     blocks: Vec<Block>,
     topic_of: Arc<BTreeMap<u16, usize>>,
+    damages: Vec<BagError>,
+    /// Messages that the summary counts, where it can be read.
+    pub(crate) claimed: Option<u64>,
     pub(crate) info: StorageInfo,
 }
 
@@ -48,14 +52,24 @@ impl McapFile {
             .metadata()
             .map_err(BagError::io(path, "examine"))?
             .len();
-        let profile = read_profile(&mut file, path, size)?;
-        let mut contents = summary::read_summary(&mut file, size).unwrap_or_else(|reason| {
+        let profile = read_profile(&mut file, path, size);
+        let summary = summary::read_summary(&mut file, size);
+        let claimed = summary.as_ref().ok().map(|contents| contents.seen.messages);
+        let mut contents = summary.unwrap_or_else(|reason| {
             log::info!(
                 "{}: {reason}; reading the whole file once to index it",
                 path.display()
             );
             scan::scan(&mut file, path, size)
         });
+        let profile = match profile {
+            Err(error) if contents.channels.is_empty() => return Err(error),
+            Err(error) => {
+                log::warn!("{error}");
+                String::new()
+            }
+            Ok(profile) => profile,
+        };
         let (mut info, topic_of) = contents.topics(path, &profile)?;
         if let Some((first, last)) = contents.seen.range_ns {
             let signed = |ns: u64| {
@@ -71,6 +85,8 @@ impl McapFile {
             temporary,
             blocks: contents.blocks,
             topic_of: Arc::new(topic_of),
+            damages: contents.damages,
+            claimed,
             info,
         })
     }

@@ -14,6 +14,7 @@ use super::{
     contents::{Block, Contents, Seen},
     records::{Place, RECORD_HEADER_BYTES, RecordError, parse_message, visit_chunk, visit_records},
     resume::next_chunk,
+    salvage::{definitions, messages},
 };
 use crate::{BagError, sniff::MCAP_MAGIC};
 
@@ -22,29 +23,26 @@ const RUN_BYTES: u64 = 1 << 20;
 
 /// Damages after which sound chunks are looked for, at most.
 const MAX_DAMAGES: usize = 1000;
+/// Schemas and channels are looked for in so many bytes at the end, where a summary repeats them.
+const MAX_SUMMARY_BYTES: u64 = 16 << 20;
 
-/// Everything up to the end of the data or the first damage, which the contents then carry; behind it only
-/// the blocks, not counted.
+/// Everything up to the end of the data or the first damage; behind it only the blocks, not counted.
 pub(super) fn scan(file: &mut File, path: &Path, size: u64) -> Contents {
     let mut scan = Scan::default();
     let ended = scan.records(file, MCAP_MAGIC.len() as u64, size);
     scan.end_run();
     let readable_messages = scan.contents.seen.messages;
-    if let Err(error) = &ended {
-        scan.go_on(file, error.place.byte, size);
-    }
-    let mut contents = scan.contents;
-    contents.damage = match ended {
-        Ok(ControlFlow::Break(())) => None,
-        Ok(ControlFlow::Continue(())) => Some(BagError::Truncated {
+    match ended {
+        Ok(ControlFlow::Break(())) => {}
+        Ok(ControlFlow::Continue(())) => scan.contents.damages.push(BagError::Truncated {
             path: path.to_path_buf(),
             size_bytes: size,
             inside: format!("the data section: a record is due at byte {size}"),
             readable_messages,
         }),
-        Err(error) => Some(error.in_file(path, size, readable_messages)),
-    };
-    contents
+        Err(error) => scan.go_on(file, path, size, error),
+    }
+    scan.contents
 }
 
 #[derive(Default)]
@@ -57,20 +55,36 @@ struct Scan {
 }
 
 impl Scan {
-    /// Takes the sound chunks behind damage at a byte, and what follows them.
-    fn go_on(&mut self, file: &mut File, damaged: u64, size: u64) {
+    /// Takes the messages of the damaged stretch, the sound chunks behind it, and what follows them.
+    fn go_on(&mut self, file: &mut File, path: &Path, size: u64, error: RecordError) {
+        let readable_messages = self.contents.seen.messages;
         self.behind = true;
-        let mut damaged = damaged;
-        for _ in 0..MAX_DAMAGES {
-            let Ok(Some(chunk)) = next_chunk(file, damaged.saturating_add(1), size) else {
-                return;
+        let summary = (size.saturating_sub(MAX_SUMMARY_BYTES), size);
+        let found = definitions(file, summary, &mut self.contents);
+        let mut error = Some(error);
+        while let Some(damage) = error.take() {
+            let damaged = damage.place.byte;
+            let damage = damage.in_file(path, size, readable_messages);
+            self.contents.damages.push(damage);
+            let is_last = self.contents.damages.len() >= MAX_DAMAGES;
+            let chunk = match is_last {
+                true => None,
+                false => next_chunk(file, damaged.saturating_add(1), size).unwrap_or_default(),
             };
-            let ended = self.records(file, chunk, size);
-            self.end_run();
-            match ended {
-                Ok(_) => return,
-                Err(error) => damaged = error.place.byte,
+            let stretch = (damaged, chunk.unwrap_or(size));
+            let salvaged = definitions(file, stretch, &mut self.contents)
+                .and_then(|()| messages(file, stretch, &self.contents.channels));
+            match salvaged {
+                Ok(blocks) => self.contents.blocks.extend(blocks),
+                Err(error) => log::warn!("{}: {error}", path.display()),
             }
+            if let Some(chunk) = chunk {
+                error = self.records(file, chunk, size).err();
+                self.end_run();
+            }
+        }
+        if let Err(error) = found {
+            log::warn!("{}: {error}", path.display());
         }
     }
 
@@ -132,6 +146,7 @@ impl Scan {
             end_ns: header.message_end_time,
             channels: None,
             behind: self.behind,
+            unchecked: false,
         };
         for (channel, (place, _)) in &seen {
             self.expect_channel(*place, *channel)?;
@@ -163,6 +178,7 @@ impl Scan {
                 end_ns: log_time_ns,
                 channels: None,
                 behind: self.behind,
+                unchecked: false,
             };
             (block, BTreeSet::new())
         });

@@ -17,6 +17,7 @@ use super::{
     McapFile,
     contents::Block,
     records::{Cause, Place, RecordError, parse_message, visit_chunk, visit_records},
+    salvage,
 };
 use crate::{
     BagError,
@@ -38,7 +39,7 @@ pub(super) struct McapStream {
     filter: Filter,
     waiting: BinaryHeap<Reverse<Waiting>>,
     waiting_bytes: u64,
-    damage: Option<BagError>,
+    damages: VecDeque<BagError>,
 }
 
 /// A message that was read; sorts by time, then by place in the file.
@@ -48,6 +49,7 @@ struct Waiting {
     block: u64,
     record: u64,
     topic: usize,
+    unchecked: bool,
     data: Vec<u8>,
 }
 
@@ -72,6 +74,8 @@ impl McapStream {
             let is_meant = filter.past_damage || !block.behind;
             is_meant && has_topic && filter.overlaps((clamp(block.start_ns), clamp(block.end_ns)))
         };
+        let told = if filter.past_damage { usize::MAX } else { 1 };
+        let damages = file.damages.iter().take(told).cloned().collect();
         let mut blocks: Vec<Block> = file.blocks.iter().filter(is_wanted).cloned().collect();
         blocks.sort_by_key(|block| (block.start_ns, block.offset));
         Ok(McapStream {
@@ -84,7 +88,7 @@ impl McapStream {
             filter,
             waiting: BinaryHeap::new(),
             waiting_bytes: 0,
-            damage: file.info.damage.clone(),
+            damages,
         })
     }
 
@@ -96,6 +100,18 @@ impl McapStream {
             (Some(block), Some(Reverse(first))) => {
                 i64::try_from(block.start_ns).is_ok_and(|start_ns| start_ns < first.log_time_ns)
             }
+        }
+    }
+
+    /// Puts the messages of a damaged chunk in its place.
+    fn salvage(&mut self, chunk: &Block) {
+        let stretch = (chunk.offset, chunk.offset.saturating_add(chunk.len));
+        match salvage::messages(&mut self.file, stretch, &self.topic_of) {
+            Ok(blocks) => blocks
+                .into_iter()
+                .rev()
+                .for_each(|block| self.blocks.push_front(block)),
+            Err(error) => log::warn!("{}: {error}", self.path.display()),
         }
     }
 
@@ -112,7 +128,8 @@ impl McapStream {
         let mut waiting_bytes = self.waiting_bytes;
         let mut take = |place, opcode, body: &[u8]| {
             if opcode == op::MESSAGE
-                && let Some(message) = wanted(place, body, topic_of, filter, number)?
+                && let Some(message) =
+                    wanted(place, body, topic_of, filter, (number, block.unchecked))?
             {
                 waiting_bytes = waiting_bytes.saturating_add(message.bytes());
                 if waiting_bytes > MAX_WAITING_BYTES {
@@ -156,7 +173,7 @@ fn wanted(
     body: &[u8],
     topic_of: &BTreeMap<u16, usize>,
     filter: &Filter,
-    block: u64,
+    (block, unchecked): (u64, bool),
 ) -> Result<Option<Waiting>, RecordError> {
     let (header, data) = parse_message(place, body)?;
     let Some(&topic) = topic_of.get(&header.channel_id) else {
@@ -172,6 +189,7 @@ fn wanted(
         block,
         record: place.in_chunk.unwrap_or(place.byte),
         topic,
+        unchecked,
         data: data.to_vec(),
     }))
 }
@@ -183,13 +201,17 @@ impl Iterator for McapStream {
         while self.needs_block() {
             let block = self.blocks.pop_front()?;
             if let Err(error) = self.read_block(&block) {
+                let is_full = matches!(error.cause, Cause::TooLarge { .. });
                 let error = error.in_file(&self.path, 0, 0);
                 if self.filter.past_damage {
+                    if !block.unchecked && !is_full {
+                        self.salvage(&block);
+                    }
                     return Some(Err(error));
                 }
                 // The waiting messages are whole, and earlier or close by: the error follows them.
                 self.blocks.clear();
-                self.damage = Some(error);
+                self.damages = VecDeque::from([error]);
             }
         }
         if let Some(Reverse(message)) = self.waiting.pop() {
@@ -197,15 +219,17 @@ impl Iterator for McapStream {
             let Waiting {
                 log_time_ns,
                 topic,
+                unchecked,
                 data,
                 ..
             } = message;
             return Some(Ok(StorageMessage {
                 topic,
                 log_time_ns,
+                unchecked,
                 data,
             }));
         }
-        self.damage.take().map(Err)
+        self.damages.pop_front().map(Err)
     }
 }

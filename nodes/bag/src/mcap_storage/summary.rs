@@ -145,5 +145,6 @@ fn block(chunk: ChunkIndex, data_end: u64) -> Result<Block, String> {
         end_ns: chunk.message_end_time,
         channels: (!channels.is_empty()).then(|| channels.into_keys().collect()),
         behind: false,
+        unchecked: false,
     })
 }

@@ -10,13 +10,22 @@ use std::{
 use rusqlite::{Connection, OpenFlags, config::DbConfig};
 use tempfile::{Builder, TempPath};
 
-use crate::BagError;
+use crate::{BagError, sniff::SQLITE_MAGIC};
+
+/// Strictness of SQLite towards a file.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Access {
+    /// Refuses pages whose cells do not fit.
+    Strict,
+    /// Reads the pages that are there of a database that is shorter than its header says.
+    Cut,
+    /// Reads of each page, also of a cut database, the cells that fit.
+    Damaged,
+}
 
 /// Opens read-only. `immutable` keeps SQLite from creating files beside the database, so that a
 /// read-only folder works; it would hide rows still in a write-ahead log, so not where one exists.
-///
-/// Of a database that is `cut` the pages that are there are read.
-pub(super) fn connect(path: &Path, cut: bool) -> Result<Connection, BagError> {
+pub(super) fn connect(path: &Path, access: Access) -> Result<Connection, BagError> {
     let path = &std::path::absolute(path).map_err(BagError::io(path, "locate"))?;
     let has_wal = has_wal(path);
     let parameters = if has_wal {
@@ -28,11 +37,12 @@ pub(super) fn connect(path: &Path, cut: bool) -> Result<Connection, BagError> {
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY
         | OpenFlags::SQLITE_OPEN_URI
         | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let cut = access != Access::Strict;
     let wrong = |e| {
         let remedy = if has_wal {
             "a recorder did not finish: copy the .db3 and .db3-wal files to a writable folder and open them there"
         } else {
-            "recover the rows with `sqlite3 FILE .recover` or take another copy"
+            "take another copy, or rescue the rest with `lattice bag recover`"
         };
         BagError::corrupt(path, "its start", e, remedy)
     };
@@ -48,8 +58,14 @@ pub(super) fn connect(path: &Path, cut: bool) -> Result<Connection, BagError> {
     ] {
         connection.set_db_config(setting, on).map_err(wrong)?;
     }
+    let check = match access {
+        Access::Damaged => "OFF",
+        Access::Strict | Access::Cut => "ON",
+    };
     connection
-        .execute_batch("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0;")
+        .execute_batch(&format!(
+            "PRAGMA cell_size_check = {check}; PRAGMA mmap_size = 0;"
+        ))
         .map_err(wrong)?;
     Ok(connection)
 }
@@ -68,7 +84,7 @@ fn wal_completes(path: &Path) -> bool {
         let count = "SELECT COUNT(*) FROM sqlite_master";
         connection.query_row(count, [], |_| Ok(())).is_ok()
     };
-    has_wal(path) && connect(path, false).is_ok_and(opens)
+    has_wal(path) && connect(path, Access::Strict).is_ok_and(opens)
 }
 
 fn percent_encode(path: &Path) -> String {
@@ -103,6 +119,26 @@ impl Cut {
             .map(Arc::new)
             .map_err(BagError::io(path, "copy the whole pages of"))
     }
+}
+
+/// A copy whose magic is right, of a file whose magic is not.
+pub(super) fn mended_magic(path: &Path) -> Result<Option<Arc<TempPath>>, BagError> {
+    let mut file = File::open(path).map_err(BagError::io(path, "open"))?;
+    let mut magic = Vec::new();
+    let mut start = file.by_ref().take(SQLITE_MAGIC.len() as u64);
+    let read = start.read_to_end(&mut magic);
+    read.map_err(BagError::io(path, "read"))?;
+    if SQLITE_MAGIC.starts_with(&magic) {
+        return Ok(None);
+    }
+    log::warn!("{}: its first bytes are damaged", path.display());
+    let mut copy = || -> io::Result<TempPath> {
+        let mut copy = Builder::new().prefix("lattice_bag_").tempfile()?;
+        io::copy(&mut SQLITE_MAGIC.chain(&mut file), copy.as_file_mut())?;
+        Ok(copy.into_temp_path())
+    };
+    let copied = copy().map(Arc::new);
+    copied.map(Some).map_err(BagError::io(path, "copy"))
 }
 
 /// Compares the size in the database header with the file's (https://www.sqlite.org/fileformat.html, 1.3).

@@ -1,12 +1,14 @@
 //! SQLite storage files of every rosbag2 schema, opened so that nothing beside them is written.
 
 mod connection;
+mod salvage;
 mod stream;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
+    fs,
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{Arc, OnceLock},
 };
 
 use rusqlite::Connection;
@@ -17,11 +19,14 @@ use super::{
     storage::{Filter, StorageInfo, StorageStream, full_type_name, lenient_qos},
     topic::absolute_name,
 };
-use connection::{connect, missing_pages};
+use connection::{Access, connect, mended_magic, missing_pages};
+use salvage::{Salvaged, salvage};
 use stream::{IMPLAUSIBLE, Key, SqliteStream};
 
 /// More topics than this are refused.
 const MAX_TOPICS: usize = 65_536;
+/// Topics that are asked for one by one where their table is damaged.
+const MAX_DAMAGED_TOPICS: i64 = 4096;
 
 /// A SQLite file whose contents are known.
 pub(crate) struct SqliteFile {
@@ -30,9 +35,11 @@ pub(crate) struct SqliteFile {
     topic_of: Arc<BTreeMap<i64, usize>>,
     /// The readable messages in order of time, where damage keeps the database from ordering them.
     rescued: Option<Arc<Vec<Key>>>,
-    has_time_index: bool,
+    /// Index of the times, where there is one.
+    time_index: Option<String>,
     /// The file is shorter than its header says.
     cut: bool,
+    salvaged: OnceLock<Arc<Salvaged>>,
     pub(crate) info: StorageInfo,
 }
 
@@ -42,7 +49,9 @@ impl SqliteFile {
         path: &Path,
         temporary: Option<Arc<TempPath>>,
     ) -> Result<SqliteFile, BagError> {
-        let (mut path, mut temporary) = (path, temporary);
+        let mended = mended_magic(path)?;
+        let mut path = mended.as_deref().map_or(path, |copy| copy);
+        let mut temporary = mended.clone().or(temporary);
         let cut = missing_pages(path)?;
         if let Some(cut) = &cut {
             temporary = Some(cut.whole_pages(path)?);
@@ -50,18 +59,28 @@ impl SqliteFile {
         let copied = temporary.clone().filter(|_| cut.is_some());
         path = copied.as_deref().map_or(path, |copy| copy);
         let missing_pages = cut.map(|cut| cut.damage);
-        let connection = connect(path, missing_pages.is_some())?;
+        let access = match missing_pages {
+            Some(_) => Access::Cut,
+            None => Access::Strict,
+        };
+        let connection = connect(path, access)?;
         let mut file = SqliteFile {
             path: path.to_path_buf(),
             temporary,
             topic_of: Arc::default(),
             rescued: None,
-            has_time_index: false,
+            time_index: None,
             cut: missing_pages.is_some(),
+            salvaged: OnceLock::new(),
             info: StorageInfo::default(),
         };
         let cut = |error: BagError| missing_pages.clone().unwrap_or(error);
-        file.read_topics(&connection).map_err(cut)?;
+        if let Err(error) = file.read_topics(&connection) {
+            file.info.topics.clear();
+            let lenient = connect(path, Access::Damaged)?;
+            file.read_topics(&lenient).map_err(|_| cut(error.clone()))?;
+            log::warn!("{error}");
+        }
         match (missing_pages.clone(), file.read_range(&connection)) {
             (None, Ok(())) => {}
             (None, Err(error)) => file.rescue(&connection, error),
@@ -73,6 +92,29 @@ impl SqliteFile {
     /// The wanted messages in order of log time.
     pub(crate) fn stream(&self, filter: Filter) -> Result<StorageStream, BagError> {
         Ok(Box::new(SqliteStream::new(self, filter)?))
+    }
+
+    /// Messages that the file held, if the rows or their index tell.
+    pub(crate) fn claimed(&self) -> Option<u64> {
+        let connection = connect(&self.path, self.access(true)).ok()?;
+        self.salvaged(&connection).claimed()
+    }
+
+    /// Messages that can be read behind damage, searched for once.
+    fn salvaged(&self, connection: &Connection) -> Arc<Salvaged> {
+        let search = || {
+            let bytes = fs::metadata(&self.path).map_or(0, |examined| examined.len());
+            Arc::new(salvage(connection, self.time_index.as_deref(), bytes))
+        };
+        self.salvaged.get_or_init(search).clone()
+    }
+
+    fn access(&self, past_damage: bool) -> Access {
+        match (self.cut, past_damage) {
+            (_, true) => Access::Damaged,
+            (true, false) => Access::Cut,
+            (false, false) => Access::Strict,
+        }
     }
 
     fn read_topics(&mut self, connection: &Connection) -> Result<(), BagError> {
@@ -91,7 +133,12 @@ impl SqliteFile {
                 remedy: "give the .db3 file of a rosbag2 bag",
             });
         }
-        let definitions = self.definitions(connection, &tables)?;
+        let definitions = self
+            .definitions(connection, &tables)
+            .unwrap_or_else(|error| {
+                log::warn!("{error}; its topics are taken without definitions");
+                BTreeMap::new()
+            });
         let wrong = |e| BagError::sqlite(&self.path, "table topics", e);
         let columns =
             names(connection, "SELECT name FROM pragma_table_info('topics')").map_err(wrong)?;
@@ -104,11 +151,11 @@ impl SqliteFile {
             column("type_description_hash"),
         );
         let select = format!(
-            "SELECT id, name, type, serialization_format, {qos}, {hash} FROM topics \
-             ORDER BY id LIMIT {MAX_TOPICS}"
+            "SELECT id, name, type, serialization_format, {qos}, {hash} FROM topics NOT INDEXED \
+             WHERE id BETWEEN ?1 AND ?2 ORDER BY id LIMIT {MAX_TOPICS}"
         );
         let mut statement = connection.prepare(&select).map_err(wrong)?;
-        let rows = statement.query_map([], |row| {
+        let named = |row: &rusqlite::Row<'_>| {
             let text = |i: usize| {
                 let text = row.get::<_, Option<String>>(i);
                 text.map(Option::unwrap_or_default)
@@ -121,10 +168,21 @@ impl SqliteFile {
                 ..TopicInfo::default()
             };
             Ok((row.get::<_, i64>(0)?, topic, text(4)?))
+        };
+        let mut read = |first: i64, last: i64| -> Result<Vec<_>, rusqlite::Error> {
+            statement.query_map([first, last], named)?.collect()
+        };
+        let rows = read(i64::MIN, i64::MAX).or_else(|error| {
+            // One by one: rosbag2 counts them from one.
+            let each = (1..=MAX_DAMAGED_TOPICS).filter_map(|id| read(id, id).ok());
+            let found: Vec<_> = each.flatten().collect();
+            match found.is_empty() {
+                true => Err(error),
+                false => Ok(found),
+            }
         });
         let mut topic_of = BTreeMap::new();
-        for row in rows.map_err(wrong)? {
-            let (id, mut topic, qos) = row.map_err(wrong)?;
+        for (id, mut topic, qos) in rows.map_err(wrong)? {
             topic.offered_qos = lenient_qos(&topic.name, &qos);
             topic.definition = definitions.get(&topic.type_name).cloned();
             topic_of.insert(id, self.info.topics.len());
@@ -133,7 +191,9 @@ impl SqliteFile {
         self.topic_of = Arc::new(topic_of);
         let indexed = "SELECT l.name FROM pragma_index_list('messages') AS l, pragma_index_info(l.name) AS i \
                        WHERE i.seqno = 0 AND i.name = 'timestamp'";
-        self.has_time_index = names(connection, indexed).is_ok_and(|found| !found.is_empty());
+        self.time_index = names(connection, indexed)
+            .ok()
+            .and_then(|found| found.into_iter().next());
         Ok(())
     }
 
@@ -211,6 +271,7 @@ impl SqliteFile {
             topic.message_count = 0;
         }
         self.info.message_count = 0;
+        self.info.implausible = 0;
         let mut keys = stream::readable_keys(connection);
         keys.sort_unstable();
         self.info.range_ns = keys

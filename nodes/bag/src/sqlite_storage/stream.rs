@@ -27,12 +27,12 @@ pub(super) struct Key {
 }
 
 /// A topic that is no number is none.
-const KEY_COLUMNS: &str =
+pub(super) const KEY_COLUMNS: &str =
     "SELECT timestamp, id, COALESCE(CAST(topic_id AS INTEGER), -1), octet_length(data)";
 /// Condition of a row that is no message; shorter than a CDR header none is.
 pub(super) const IMPLAUSIBLE: &str = "typeof(timestamp) <> 'integer' OR timestamp < 0 OR octet_length(data) IS NULL OR octet_length(data) < 4";
 
-fn key(row: &rusqlite::Row<'_>) -> Result<Key, rusqlite::Error> {
+pub(super) fn key(row: &rusqlite::Row<'_>) -> Result<Key, rusqlite::Error> {
     Ok(Key {
         timestamp_ns: row.get(0)?,
         id: row.get(1)?,
@@ -68,28 +68,34 @@ pub(super) struct SqliteStream {
     after: Option<(i64, i64)>,
     page_keys: usize,
     messages_read: u64,
-    damage: Option<BagError>,
+    damages: VecDeque<BagError>,
 }
 
 impl SqliteStream {
     pub(super) fn new(file: &SqliteFile, filter: Filter) -> Result<SqliteStream, BagError> {
+        let past_damage = filter.past_damage;
         let mut stream = SqliteStream {
-            connection: connect(&file.path, file.cut)?,
+            connection: connect(&file.path, file.access(filter.past_damage))?,
             path: file.path.clone(),
             _temporary: file.temporary.clone(),
             topic_of: file.topic_of.clone(),
             filter,
             keys: VecDeque::new(),
             after: None,
-            page_keys: if file.has_time_index {
+            page_keys: if file.time_index.is_some() {
                 PAGE_KEYS
             } else {
                 PAGE_KEYS_UNSORTED
             },
             messages_read: 0,
-            damage: file.info.damage.clone(),
+            damages: file.info.damage.iter().cloned().collect(),
         };
-        if let Some(rescued) = &file.rescued {
+        let salvaged = past_damage.then(|| file.salvaged(&stream.connection));
+        if let Some(salvaged) = &salvaged {
+            stream.damages.extend(salvaged.damages(&file.path));
+        }
+        let salvaged = salvaged.as_ref().map(|salvaged| &salvaged.keys);
+        if let Some(rescued) = salvaged.or(file.rescued.as_deref()) {
             stream.keys = rescued
                 .iter()
                 .filter(|key| stream.wants(key))
@@ -166,6 +172,7 @@ impl SqliteStream {
         Ok(StorageMessage {
             topic,
             log_time_ns: key.timestamp_ns,
+            unchecked: false,
             data,
         })
     }
@@ -183,9 +190,11 @@ impl Iterator for SqliteStream {
             }
         };
         match next {
-            Some(Err(error)) => Some(Err(self.damage.take().unwrap_or(error))),
+            Some(Err(error)) if !self.filter.past_damage => {
+                Some(Err(self.damages.pop_front().unwrap_or(error)))
+            }
             Some(message) => Some(message),
-            None => self.damage.take().map(Err),
+            None => self.damages.pop_front().map(Err),
         }
     }
 }

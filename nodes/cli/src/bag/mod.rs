@@ -6,7 +6,7 @@ mod info;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use lattice_bag::{Recovered, recover};
+use lattice_bag::{Recovered, Unchecked, recover};
 
 use crate::{CliResult, init_logging};
 
@@ -46,15 +46,36 @@ impl Bag {
         } else {
             print(&recovered);
         }
+        if recovered.is_nothing() {
+            let bag = command.bag.display();
+            return Err(format!("{bag}: nothing can be recovered; take another copy").into());
+        }
         Ok(())
     }
 }
 
 fn print(recovered: &Recovered) {
     println!("{} messages recovered", recovered.messages);
-    if let Some(claimed) = recovered.claimed {
-        let lost = claimed.saturating_sub(recovered.messages);
-        println!("{lost} lost of {claimed} that its index or metadata count");
+    match (recovered.lost, recovered.claimed) {
+        (Some(0), _) if recovered.damages == 0 => println!("0 lost"),
+        (Some(0), Some(all)) => println!("as many as its metadata or index counts ({all})"),
+        (Some(lost), Some(all)) => {
+            println!("{lost} lost of {all} that its metadata or index counts");
+        }
+        _ => println!("unknown how many are lost: neither metadata.yaml nor an index counts them"),
+    }
+    for Unchecked {
+        topic,
+        log_times_ns,
+    } in &recovered.unchecked
+    {
+        let span = log_times_ns.iter().min().zip(log_times_ns.iter().max());
+        let (first_ns, last_ns) = span.unwrap_or((&0, &0));
+        println!(
+            "{} on {topic} unchecked, from {first_ns} to {last_ns} ns: their checksum is wrong, and some may be \
+             altered (--json lists them)",
+            log_times_ns.len()
+        );
     }
     if recovered.refused > 0 {
         let refused = recovered.refused;

@@ -137,7 +137,7 @@ impl Replay {
                 return Err(format!("{option} needs --direct").into());
             }
         }
-        let bag = BagReader::open(&self.bag)?;
+        let bag = BagReader::open(&self.bag)?.past_cut();
         let plan = self.plan(&bag)?;
         let lattices: Vec<_> = self.maps()?.into_iter().map(|map| map.lattice).collect();
         if lattices.len() > MAX_LOOPBACK_LATTICES {
@@ -160,7 +160,7 @@ impl Replay {
     }
 
     fn replay_direct(&self) -> CliResult<RunReport> {
-        let bag = BagReader::open(&self.bag)?;
+        let bag = BagReader::open(&self.bag)?.past_cut();
         let plan = self.plan(&bag)?;
         let mut transformer = TransformerOptions::from_params(&self.params_of("enu_transformer")?)?;
         transformer.ins.source = plan.source;

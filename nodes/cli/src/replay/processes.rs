@@ -88,6 +88,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
         lattices: lattices.into_values().collect(),
         origin: None,
         implausible_rows: replay.reader.implausible_rows(),
+        cuts: replay.reader.cuts(),
         choices: replay.plan.choices.clone(),
         wall_s: begin.elapsed().as_secs_f64(),
     };

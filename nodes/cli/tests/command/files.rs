@@ -50,8 +50,12 @@ fn on_a_full_disk_and_at_a_kill_the_old_file_stays_and_nothing_else() {
             let output = confined(full, &command);
             let errors = String::from_utf8_lossy(&output.stderr);
             assert!(!output.status.success(), "{command:?}: {errors}");
-            assert_eq!(output.status.code().is_some(), full != "true");
-            assert!(full == "true" || errors.contains(&out), "{errors}");
+            assert_eq!(
+                output.status.code(),
+                Some(1),
+                "{command:?} {full}: {errors}"
+            );
+            assert!(errors.contains(&out), "{errors}");
             assert_eq!(fs::read_to_string(&out).unwrap(), "old", "{command:?}");
             assert_eq!(fs::read_dir(&folder).unwrap().count(), 1, "{command:?}");
         }
@@ -228,7 +232,7 @@ fn an_earlier_log_stays_until_the_new_one_is_whole() {
     };
     let before = files();
     for full in ["trap '' XFSZ", "true"] {
-        assert!(!confined(full, &simulate("3")).status.success());
+        assert_eq!(confined(full, &simulate("3")).status.code(), Some(1));
         assert!(files() == before, "{full}");
     }
     text(&simulate("3"));
@@ -243,7 +247,7 @@ fn an_earlier_log_stays_until_the_new_one_is_whole() {
 }
 
 #[test]
-fn a_cut_log_is_recovered() {
+fn a_cut_log_is_replayed_up_to_the_cut_and_recovered() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name).display().to_string();
     let (log, out) = (at("log"), at("sound"));
@@ -251,12 +255,43 @@ fn a_cut_log_is_recovered() {
     let file = directory.path().join("log/log_0.mcap");
     let whole = fs::read(&file).unwrap();
     fs::write(&file, &whole[..whole.len() * 3 / 4]).unwrap();
-    let refused = lattice(&["replay", "--direct", &log, "--params", PARAMS]);
-    let errors = String::from_utf8_lossy(&refused.stderr);
-    assert!(errors.contains("truncated") && errors.contains("lattice bag recover"));
+    let all = json(&["bag", "info", &log])["metadata_messages"].as_u64();
+    for log in [&log, &file.display().to_string()] {
+        let cut = json(&["replay", "--direct", log, "--params", PARAMS]);
+        assert!(cut["clouds_in_log"].as_u64() > Some(1), "{cut}");
+        let told = cut["cuts"][0].as_str().unwrap();
+        assert!(
+            told.contains("truncated") && told.contains("messages precede it"),
+            "{told}"
+        );
+    }
     let recovered = json(&["bag", "recover", &log, "--out", &out]);
-    assert!(recovered["messages"].as_u64() > Some(10), "{recovered}");
-    assert!(recovered["told"][0].as_str().unwrap().contains("truncated"));
+    let messages = recovered["messages"].as_u64().unwrap();
+    assert!(messages > 10, "{recovered}");
+    assert_eq!(
+        (recovered["claimed"].as_u64(), recovered["lost"].as_u64()),
+        (all, Some(all.unwrap() - messages))
+    );
+    let told = recovered["told"][0].as_str().unwrap();
+    assert!(
+        told.contains("truncated") && !told.contains("bag recover"),
+        "{told}"
+    );
     let report = json(&["replay", "--direct", &out, "--params", PARAMS]);
     assert!(report["clouds_in_log"].as_u64() > Some(1), "{report}");
+    assert_eq!(report["cuts"].as_array().map(Vec::len), Some(0));
+    // Without metadata nobody knows how many there were.
+    fs::remove_file(directory.path().join("log/metadata.yaml")).unwrap();
+    let said = text(&["bag", "recover", &log, "--out", &at("again")]);
+    assert!(
+        said.contains("unknown how many are lost") && !said.contains("0 lost"),
+        "{said}"
+    );
+    // Of nothing that can be read no log is made.
+    fs::write(&file, &whole[..200]).unwrap();
+    let nothing = lattice(&["bag", "recover", &log, "--out", &at("nothing")]);
+    let errors = String::from_utf8_lossy(&nothing.stderr);
+    assert_eq!(nothing.status.code(), Some(1), "{errors}");
+    assert!(errors.contains("nothing can be recovered"), "{errors}");
+    assert!(!Path::new(&at("nothing")).exists());
 }

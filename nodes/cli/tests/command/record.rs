@@ -221,8 +221,8 @@ fn on_a_full_disk_a_recording_ends_and_what_it_has_can_be_read() {
         let bag = folder.path().join(format!("full_{storage}"));
         let bag = bag.display().to_string();
         let domain = LoopbackDomain::take().unwrap();
-        // Files of a megabyte; what is beyond is an error, not a signal.
-        let script = "trap '' XFSZ; ulimit -f 2048; exec \"$@\"";
+        // Files of a megabyte; what is beyond is a signal.
+        let script = "ulimit -f 2048; exec \"$@\"";
         let mut confined = Command::new("sh");
         let record = ["record", "-a", "-s", storage, "-o", &bag];
         let confined = confined
@@ -248,7 +248,7 @@ fn on_a_full_disk_a_recording_ends_and_what_it_has_can_be_read() {
         player.kill().unwrap();
         player.wait().unwrap();
         let errors = String::from_utf8_lossy(&ended.stderr);
-        assert!(!ended.status.success(), "{errors}");
+        assert_eq!(ended.status.code(), Some(1), "{errors}");
         let last = errors.lines().last().unwrap();
         assert!(
             last.contains(&bag) && last.contains("free space"),
@@ -284,10 +284,16 @@ fn a_recorder_that_is_killed_leaves_what_it_had() {
         let left: u64 = left.map(|topic| topic["messages"].as_u64().unwrap()).sum();
         assert!(left > 100, "{storage}: {info}");
         let out = folder.path().join("whole").display().to_string();
-        let recovered = text(&["bag", "recover", &bag, "--out", &out]);
+        let recovered = json(&["bag", "recover", &bag, "--out", &out]);
         let whole = BagReader::open(out.as_ref()).unwrap();
+        // Those of a chunk that is cut come on top, marked.
+        let unchecked = recovered["unchecked"].as_array().unwrap().iter();
+        let unchecked: usize = unchecked
+            .map(|of| of["log_times_ns"].as_array().unwrap().len())
+            .sum();
+        let readable = whole.message_count() - unchecked as u64;
         assert_eq!(
-            Some(whole.message_count()),
+            Some(readable),
             info["messages"].as_u64(),
             "{storage}: {recovered}\n{info}"
         );

@@ -23,6 +23,9 @@ use super::ros_args::RosArgs;
 use super::shared::{DEFAULT_MAX_MESSAGE_BYTES, Shared};
 use super::subscription::{Load, Sample, Stats, Subscription, Undecoded};
 
+/// Least `max_message_bytes`: an Odometry takes 720 bytes, so that below it no pose would be taken.
+const MIN_MESSAGE_BYTES: usize = 1000;
+
 /// A node of the process. Clones are the same node.
 #[derive(Clone)]
 pub struct Node {
@@ -58,7 +61,7 @@ impl Node {
         let max_message_bytes = params.usize_in(
             "max_message_bytes",
             DEFAULT_MAX_MESSAGE_BYTES,
-            1..=u32::MAX as usize,
+            MIN_MESSAGE_BYTES..=u32::MAX as usize,
         )?;
         let id = shared.add_node(&namespace, &name)?;
         let clock = Clock::default();

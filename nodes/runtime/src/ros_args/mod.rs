@@ -41,6 +41,11 @@ pub struct RosArgs {
 }
 
 impl RosArgs {
+    /// Parameter files, in the order given.
+    pub fn params_files(&self) -> &[std::path::PathBuf] {
+        &self.params_files
+    }
+
     /// Parses a command line, with or without the program's name in front.
     ///
     /// A malformed rule fails at once; of an unknown argument inside a scope the log is warned.

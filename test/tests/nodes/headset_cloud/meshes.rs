@@ -116,13 +116,12 @@ fn another_session_ends_all_that_was_known() {
     let told = machine.on_mesh(&Arc::new(of("first", 5)));
     assert_eq!(told, [HeadsetOutput::Session("first".to_owned())]);
     assert!(machine.on_mesh(&Arc::new(of("first", 6))).is_empty());
-    // What is not newer is late, and what was left does not come back.
-    assert!(machine.on_mesh(&Arc::new(of("second", 6))).is_empty());
+    // What was left does not come back, whatever its stamp.
     let told = machine.on_mesh(&Arc::new(of("second", 7)));
     assert_eq!(told, [HeadsetOutput::Session("second".to_owned())]);
     assert_eq!(machine.mesh_size(), [1, 2]);
     assert!(machine.on_mesh(&Arc::new(of("first", 8))).is_empty());
-    assert_eq!(machine.counts().dropped["mesh_other_session"], 2);
+    assert_eq!(machine.counts().dropped["mesh_other_session"], 1);
     assert_eq!(machine.counts().sessions, 1);
     // Its poses are gone: images wait.
     assert!(look(&mut machine, AT_NS).is_empty());
@@ -138,6 +137,51 @@ fn another_session_ends_all_that_was_known() {
     assert_eq!(machine.mesh_size(), [0, 0]);
     machine.on_mesh(&Arc::new(of("third", 1)));
     assert_eq!(machine.mesh_size(), [1, 2]);
+}
+
+#[test]
+fn a_session_begins_whatever_its_clock_says() {
+    const SECOND_NS: i64 = 1_000_000_000;
+    let of = |session: &str, stamp_ns| HeadsetMesh {
+        session: session.to_owned(),
+        ..shifted(0.0, stamp_ns)
+    };
+    let mut machine = machine(&[]);
+    // A clock in 2038, set right with the next start; then one of 1970; then the right one again.
+    let year_2038_ns = 2_147_483_647 * SECOND_NS;
+    let year_2026_ns = 1_795_000_000 * SECOND_NS;
+    for (number, (session, stamp_ns)) in [
+        ("of 2038", year_2038_ns),
+        ("of 2026", year_2026_ns),
+        ("of 1970", 5),
+        ("of 2026 again", year_2026_ns + SECOND_NS),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        machine.at(number as i64 * SECOND_NS);
+        let told = machine.on_mesh(&Arc::new(of(session, stamp_ns)));
+        assert_eq!(told, [HeadsetOutput::Session(session.to_owned())]);
+        assert_eq!(machine.mesh_size(), [1, 2], "{session}");
+    }
+    // What arrives late of any of them is refused, also with the newest stamp.
+    for session in ["of 2038", "of 2026", "of 1970"] {
+        assert!(
+            machine
+                .on_mesh(&Arc::new(of(session, year_2038_ns + 1)))
+                .is_empty()
+        );
+    }
+    assert_eq!(machine.counts().dropped["mesh_other_session"], 3);
+    // Within the session the clock may be set too.
+    machine.on_mesh(&Arc::new(of("of 2026 again", 7)));
+    assert_eq!(machine.counts().dropped.len(), 1, "{:?}", machine.counts());
+    // An application that was in the background goes on when the other is silent.
+    machine.at(12 * SECOND_NS);
+    assert!(machine.on_mesh(&Arc::new(of("of 1970", 6))).is_empty());
+    machine.at(14 * SECOND_NS);
+    let told = machine.on_mesh(&Arc::new(of("of 1970", 6)));
+    assert_eq!(told, [HeadsetOutput::Session("of 1970".to_owned())]);
 }
 
 #[test]
