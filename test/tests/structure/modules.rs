@@ -20,8 +20,8 @@ const LAYERS: [(&str, &str); 3] = [
     ),
     (
         "nodes/runtime/src",
-        "sync arrivals names param_value params_file ros_args params security env logging qos error shutdown \
-         task_thread timer clock diagnostics loopback_domain remote port confine cyclone rmw_zenoh peers gate neighbours endpoints outbox \
+        "sync names param_value params_file ros_args params security env logging qos error shutdown \
+         task_thread timer clock diagnostics loopback_domain remote port arrivals confine cyclone rmw_zenoh peers gate neighbours endpoints outbox \
          graph local_bus publisher subscription service rosout shared node param_services \
          logger_services type_description action tf lifecycle process",
     ),

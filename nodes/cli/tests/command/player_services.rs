@@ -16,7 +16,7 @@ use lattice_msgs::{RosService, cdr};
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Node, Runtime, Subscription};
+use lattice_runtime::{Client, Load, LoopbackDomain, Node, Runtime, Subscription};
 use serde_json::{Value, json};
 use wait_timeout::ChildExt;
 
@@ -66,20 +66,20 @@ impl Asked {
         }
     }
 
-    fn call<S: RosService>(&self, name: &str, request: &S::Request) -> S::Response {
-        let client = self
-            .node
+    fn client<S: RosService>(&self, name: &str) -> Client {
+        self.node
             .client::<S>(&format!("/bag_player/{name}"))
-            .unwrap();
-        let request = cdr::to_vec(request).unwrap();
-        let answer = smol::block_on(client.call(request, PATIENCE)).unwrap();
-        cdr::from_slice(&answer).unwrap()
+            .unwrap()
+    }
+
+    fn call<S: RosService>(&self, name: &str, request: &S::Request) -> S::Response {
+        call::<S>(&self.client::<S>(name), request)
     }
 
     /// A call whose answer comes later.
     fn burst(&self, num_messages: u64) -> Receiver<u64> {
         let (tell, told) = channel();
-        let client = self.node.client::<Burst>("/bag_player/burst").unwrap();
+        let client = self.client::<Burst>("burst");
         let request = cdr::to_vec(&BurstRequest { num_messages }).unwrap();
         thread::spawn(move || {
             let answer = smol::block_on(client.call(request, 10 * PATIENCE)).unwrap();
@@ -91,17 +91,19 @@ impl Asked {
 
     /// Asks again and again, and has the calls that were late.
     fn ask(&self, state: &str, is_paused: bool) {
-        // The first one waits for the discovery of its endpoints.
-        let _ = self.call::<IsPaused>("is_paused", &IsPausedRequest::default());
-        let _ = self.call::<GetRate>("get_rate", &GetRateRequest::default());
+        let paused = self.client::<IsPaused>("is_paused");
+        let rate = self.client::<GetRate>("get_rate");
+        // The first call of each waits for the discovery of its endpoints.
+        let _ = call::<IsPaused>(&paused, &IsPausedRequest::default());
+        let _ = call::<GetRate>(&rate, &GetRateRequest::default());
         let mut late = Vec::new();
         for _ in 0..CALLS {
             let begin = Instant::now();
-            let paused = self.call::<IsPaused>("is_paused", &IsPausedRequest::default());
-            assert_eq!(paused.paused, is_paused, "{state}");
+            let answer = call::<IsPaused>(&paused, &IsPausedRequest::default());
+            assert_eq!(answer.paused, is_paused, "{state}");
             late.push(begin.elapsed());
             let begin = Instant::now();
-            let _ = self.call::<GetRate>("get_rate", &GetRateRequest::default());
+            let _ = call::<GetRate>(&rate, &GetRateRequest::default());
             late.push(begin.elapsed());
         }
         late.sort_unstable();
@@ -133,6 +135,12 @@ impl Drop for Asked {
         let _ = self.player.wait();
         self.runtime.shutdown_handle().request();
     }
+}
+
+fn call<S: RosService>(client: &Client, request: &S::Request) -> S::Response {
+    let request = cdr::to_vec(request).unwrap();
+    let answer = smol::block_on(client.call(request, PATIENCE)).unwrap();
+    cdr::from_slice(&answer).unwrap()
 }
 
 /// A subscription whose messages come through the channel.
