@@ -5,8 +5,8 @@ use tract_onnx::pb::{AttributeProto, GraphProto, ModelProto, NodeProto, TensorPr
 
 /// Most values of a tensor: 1 GiB of floats.
 pub(super) const MAX_TENSOR_VALUES: usize = 1 << 28;
-/// Most operators of a graph. Published networks of segmentation have up to 3000; the time to prepare them grows
-/// with the square.
+/// Most operators of a graph, since the time to prepare them grows with the square. Chosen, not measured; what is
+/// slow below it ends by the bound of time.
 const MAX_OPERATORS: usize = 4000;
 /// Most letters of a file that are shown.
 const SHOWN: usize = 160;

@@ -33,7 +33,7 @@ pub(crate) const NETWORK: &[About] = about! {
     "compressed_color" fixed(options::TOPIC): "Whether images of colours are taken packed (JPEG), from the topic with /compressed behind its name.";
 };
 
-/// Longest time in which a network is made ready: that of the largest published ones is a tenth.
+/// Longest time in which a network is made ready, about as long as somebody waits for a node to start.
 const MAX_LOAD: Duration = Duration::from_secs(60);
 /// Time between two looks at the request to end.
 const POLL: Duration = Duration::from_millis(50);
