@@ -1,4 +1,4 @@
-//! Messages that are played one by one while the log is held, and who is told of it.
+//! Messages played one by one while the player is paused, and the replies to the calls that asked for them.
 
 /// Messages still to be played, of a call of `~/burst` or `~/play_next`.
 pub(super) struct Steps {

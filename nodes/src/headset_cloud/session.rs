@@ -19,7 +19,7 @@ pub(super) enum Told {
 }
 
 /// Silence after which a session that had ended may go on, as of an application that was in the background.
-/// What is on its way arrives sooner.
+/// Messages delayed by the network arrive within it.
 const SILENT_NS: i64 = 10_000_000_000;
 /// Ended sessions that are known.
 const MAX_ENDED: usize = 16;

@@ -28,7 +28,7 @@ const MAX_REPRESENTATION: u8 = 0x0b;
 /// Runs of messages are read in blocks of about this many bytes.
 const RUN_BYTES: u64 = 1 << 20;
 
-/// Reader of single bytes' surroundings, a window at a time.
+/// Random access to the bytes of a file through a buffered window.
 struct Window<'a> {
     file: &'a mut File,
     bytes: Vec<u8>,
@@ -176,7 +176,7 @@ fn chunk_span(head: &[u8]) -> Option<(u64, u64)> {
     (head.first() == Some(&op::CHUNK) && span.0 <= span.1).then_some(span)
 }
 
-/// What messages of a stretch have in common.
+/// Known channels and bounds of log time for the messages of a stretch.
 struct Known<'a, V> {
     channels: &'a BTreeMap<u16, V>,
     /// First and last log time, ns.

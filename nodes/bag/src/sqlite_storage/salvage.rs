@@ -15,7 +15,7 @@ const MAX_KEYS: usize = 1 << 26;
 /// Stretches of lost rows that are listed; others are counted with the last one.
 const MAX_STRETCHES: usize = 1000;
 
-/// What can be read of the table of messages.
+/// Readable rows of the table of messages.
 #[derive(Default)]
 pub(super) struct Salvaged {
     /// In order of time.

@@ -29,7 +29,7 @@ const ANSWERED: Duration = Duration::from_millis(100);
 /// Calls of each service, of which one in ten may be late: the machine may have other work.
 const CALLS: usize = 20;
 
-/// A player and who asks it.
+/// A player, and a node that calls its services.
 struct Asked {
     player: Child,
     node: Node,
@@ -42,7 +42,7 @@ impl Asked {
         Self::of(domain, play(domain, log, parameters))
     }
 
-    /// Who asks a player that is started.
+    /// A node that calls the services of a player already started.
     fn of(domain: &LoopbackDomain, mut player: Child) -> Self {
         let network = Network {
             domain_id: domain.id(),
@@ -89,7 +89,7 @@ impl Asked {
         told
     }
 
-    /// Asks again and again, and has the calls that were late.
+    /// Calls two services repeatedly and asserts their latency.
     fn ask(&self, state: &str, is_paused: bool) {
         let paused = self.client::<IsPaused>("is_paused");
         let rate = self.client::<GetRate>("get_rate");

@@ -117,7 +117,7 @@ impl Discovery {
         });
     }
 
-    /// Tells of a subscription or server.
+    /// Emits the event of a discovered subscription or server.
     fn found_reader(&self, other: &Other<'_>) {
         let name = other.name.to_str().ok();
         if let Some((role, name)) = name.and_then(|name| role(Side::Reader, name)) {

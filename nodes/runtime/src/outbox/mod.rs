@@ -31,7 +31,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// The same, after a sample was dropped: a peer that hangs must not slow down the others.
 const PATIENCE_WITH_STUCK_PEER: Duration = Duration::from_millis(20);
 
-/// After so many samples in a row, a queue that never empties lets the others of its thread have a turn.
+/// Consecutive samples after which the task of a queue yields to the other tasks of its thread.
 const JOBS_PER_TURN: u32 = 16;
 
 /// Between two warnings of dropped messages.

@@ -4,7 +4,7 @@ use futures::future::BoxFuture;
 
 use super::*;
 
-/// A writer whose reader is stuck.
+/// A writer whose reader does not acknowledge.
 struct Stuck;
 
 impl SampleWriter for Stuck {

@@ -74,7 +74,7 @@ impl Graph {
         }
     }
 
-    /// A token is there.
+    /// Handles a new liveliness token.
     pub(super) fn declared(&self, key: &str) {
         let token = match read_token(key) {
             Ok(Some(token)) if token.zid != self.zid => token,
@@ -97,7 +97,7 @@ impl Graph {
         let _ = state.others.insert(peer, token);
     }
 
-    /// A token has gone.
+    /// Handles the end of a liveliness token.
     pub(super) fn undeclared(&self, key: &str) {
         let peer = gid(key);
         if lock(&self.state).others.remove(&peer).is_some() {

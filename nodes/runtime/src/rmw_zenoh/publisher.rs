@@ -1,4 +1,4 @@
-//! Publishers: samples go out one after the other, by threads that may wait for a full link.
+//! Publishers: threads that may block on a full link send samples in order.
 
 use std::sync::Arc;
 use std::sync::Mutex;
@@ -25,7 +25,7 @@ use crate::sync::lock;
 /// Encapsulation header of little-endian CDR.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 
-/// Between two notes of the last number, by which subscribers find out what they miss; that of rmw_zenoh.
+/// Heartbeat period, by which subscribers detect lost samples; the value of rmw_zenoh.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
 /// A publisher with or without a cache for late joiners.
@@ -92,7 +92,7 @@ impl ZenohPublisher {
     }
 }
 
-/// What is reliable waits for a link that is full: rmw_zenoh does so if all history is kept, and else drops.
+/// Reliable samples block on a full link; rmw_zenoh blocks for keep_all only, and drops otherwise.
 pub(super) fn congestion_control(qos: &Qos) -> CongestionControl {
     match qos.reliability {
         Reliability::Reliable => CongestionControl::Block,
@@ -129,7 +129,7 @@ impl SampleWriter for ZenohPublisher {
     }
 }
 
-/// Hands samples to Zenoh one after the other, on threads where waiting holds up nobody.
+/// Sends samples in order, on threads that may block.
 #[derive(Default)]
 pub(super) struct InTurn(Mutex<Option<Running>>);
 

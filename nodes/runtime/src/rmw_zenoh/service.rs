@@ -28,7 +28,7 @@ const QUERY_TIMEOUT: Duration = Duration::from_secs(600);
 /// Requests that wait for their replies, at most; of more, the oldest are given up.
 const MAX_PENDING: usize = 4096;
 
-/// Liveliness token and place in the graph; both go with the endpoint.
+/// Liveliness token and graph entry of an endpoint.
 type Announced = (LivelinessToken, Place);
 
 /// A server of a key.

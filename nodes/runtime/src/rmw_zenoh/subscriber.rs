@@ -1,4 +1,4 @@
-//! Subscriptions: samples are taken as they come, on a thread of Zenoh that is never held up.
+//! Subscriptions: a callback on a thread of Zenoh stores samples and never blocks.
 
 use std::collections::BTreeMap;
 use std::iter;
@@ -24,10 +24,10 @@ use crate::sync::lock;
 /// Publishers whose numbers are followed, at most.
 const MAX_PUBLISHERS: usize = 4096;
 
-/// The caches of publishers have time to answer; a robot's may be slow.
+/// Timeout of the query to the caches of publishers.
 const HISTORY_TIMEOUT: Duration = Duration::from_secs(600);
 
-/// What came, or why it is refused.
+/// A received sample, or the reason for its refusal.
 pub(super) type Arrival = Result<(ZBytes, Origin), String>;
 
 /// Samples that came, for the task that reads them.

@@ -1,4 +1,4 @@
-//! The calls of one client over the network: who has asked, and which answer is whose.
+//! Calls of one client over the network, and the correlation of replies with requests.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicI64, Ordering::Relaxed};

@@ -181,7 +181,7 @@ impl Shared {
         Ok(Arc::new(outbox))
     }
 
-    /// What `make` makes of the transport, for the topic or service `name`.
+    /// Result of `make` on the open transport; after shutdown an error that names the topic or service.
     fn transport<T>(
         &self,
         name: &str,

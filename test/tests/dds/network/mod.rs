@@ -25,7 +25,7 @@ const DOMAIN: &str = "LATTICE_TEST_NETWORK_DOMAIN";
 /// A publisher of a node, the same of the other reliability, and one as a player has it.
 const TOPICS: [&str; 3] = ["/reliable", "/best_effort", "/kept"];
 
-/// What a sender said of a topic at its end.
+/// Final counters of a sender for one topic.
 #[derive(Debug, Default)]
 struct Sent {
     /// Messages given to the publisher.
@@ -36,7 +36,7 @@ struct Sent {
     unacknowledged: u64,
 }
 
-/// What a receiver said of a topic at its end.
+/// Final counters of a receiver for one topic.
 #[derive(Debug, Default)]
 struct Heard {
     first: u64,
