@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::error::FittingUnit;
 use super::layout::shown;
 use super::time_field::{TimeField, candidates};
-use super::{CloudError, CloudView, PointField, TimeOptions, TimeReference, TimeUnit};
+use super::{CloudError, CloudView, Datatype, PointField, TimeOptions, TimeReference, TimeUnit};
 
 /// Time of a point that has none.
 pub const NO_TIME_NS: i64 = i64::MIN;
@@ -100,10 +100,11 @@ impl<'a> CloudView<'a> {
             }));
         };
         let (earliest_ns, latest_ns) = clock.range_ns;
+        let value_of = self.scalars(clock.field);
         let times = (0..self.len())
             .into_par_iter()
             .with_min_len(MIN_TASK)
-            .map(|i| match to_ns(self.scalar(clock.field, i), clock.unit) {
+            .map(|i| match to_ns(value_of(self.record(i)), clock.unit) {
                 Some(ns) if (earliest_ns..=latest_ns).contains(&ns) => {
                     clock.zero_ns.saturating_add(ns)
                 }
@@ -141,14 +142,27 @@ impl<'a> CloudView<'a> {
         clock.map(Some).ok_or(error)
     }
 
+    /// Gives the value of `field` in a record; NaN if it is not there.
+    fn scalars(&self, field: &PointField) -> impl Fn(&[u8]) -> f64 + Sync {
+        let datatype = Datatype::from_code(field.datatype).filter(|_| field.count > 0);
+        let offset = field.offset as usize;
+        move |record| {
+            datatype.map_or(f64::NAN, |datatype| {
+                self.number_of(record, datatype, offset)
+            })
+        }
+    }
+
     /// Least and greatest value of `field` over the returns; `None` if there are none.
     fn value_range(&self, field: &PointField) -> Option<(f64, f64)> {
+        let value_of = self.scalars(field);
         (0..self.len())
             .into_par_iter()
             .with_min_len(MIN_TASK)
             .filter_map(|i| {
-                let value = self.scalar(field, i);
-                (value.is_finite() && is_return(&self.xyz(i))).then_some((value, value))
+                let record = self.record(i);
+                let value = value_of(record);
+                (value.is_finite() && is_return(&self.xyz_of(record))).then_some((value, value))
             })
             .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
@@ -269,9 +283,17 @@ fn to_ns(value: f64, unit: TimeUnit) -> Option<i64> {
         return None;
     }
     let scale = unit.scale_ns();
-    let whole = value.trunc();
-    let rest_ns = ((value - whole) * scale as f64).round() as i64;
-    Some((whole as i64).saturating_mul(scale).saturating_add(rest_ns))
+    // Conversions truncate and saturate; without SSE4.1 `trunc` and `round` are calls.
+    let whole = value as i64;
+    let rest = (value - whole as f64) * scale as f64;
+    let rest_ns = rest as i64;
+    let beyond = rest - rest_ns as f64;
+    let up = i64::from(beyond >= 0.5) - i64::from(beyond <= -0.5);
+    Some(
+        whole
+            .saturating_mul(scale)
+            .saturating_add(rest_ns.saturating_add(up)),
+    )
 }
 
 fn seconds_between(from_ns: i64, to_ns: i64) -> f64 {

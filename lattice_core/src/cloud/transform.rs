@@ -1,8 +1,9 @@
-//! Deskew: every point into the map with the pose of its own time.
+//! Deskew: every point into the map with the pose of its own time, from record to record in one pass.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
+use super::record::{Copies, Precision, RecordFormat, write_vector};
 use super::{CloudView, NO_TIME_NS};
 
 /// Points of one task, at least, and tasks of one thread: enough to share the work evenly.
@@ -11,6 +12,8 @@ const CHUNKS_PER_THREAD: usize = 4;
 /// Times remembered while looking for equal ones, as a power of two: many more than the
 /// columns of a spinning laser.
 const MEMO_BITS: u32 = 15;
+/// Slot of a point without a time.
+const NO_SLOT: u32 = u32::MAX;
 
 /// Distances kept, in the sensor frame: `min_range_m < distance <= max_range_m`, so that
 /// the sensor's origin, which many drivers send for no return, is never kept.
@@ -31,19 +34,21 @@ impl Default for RangeLimits {
     }
 }
 
-/// Points in the map, in the order of the cloud, and what was kept out.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Transformed {
-    /// Points in the map frame, metres.
-    pub points_m: Vec<Vector3<f64>>,
+/// Records of the points in the map, in the order of the cloud, and the numbers of those left out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Records {
+    /// Records as [`RecordFormat::fields`] lays them out, coordinates in the map frame in metres.
+    pub data: Vec<u8>,
+    /// Number of records.
+    pub points: usize,
+    /// Type of their coordinates.
+    pub precision: Precision,
     /// Points with a NaN or infinite coordinate.
     pub not_finite: usize,
     /// Finite points nearer or further than the limits.
     pub out_of_range: usize,
     /// Points within range that have no time.
     pub no_time: usize,
-    /// Indices of the points kept out for any reason, ascending.
-    pub left_out: Vec<usize>,
 }
 
 /// Brings the points of `view` into the map: point `i` by `map_from_sensor(times[i])`, or
@@ -53,91 +58,192 @@ pub struct Transformed {
 /// Runs on rayon; the order and the bits of the result do not depend on the number of
 /// threads. Poses of times that come again are looked up once. Fails as a whole with the
 /// error of the first point kept, in order, whose pose is missing.
-pub fn transform_points<E: Send>(
+pub fn transform_records<E: Send>(
     view: &CloudView<'_>,
     stamp_ns: i64,
     times: Option<&[i64]>,
     range: &RangeLimits,
+    format: &RecordFormat,
     map_from_sensor: impl Fn(i64) -> Result<Isometry3<f64>, E> + Sync,
-) -> Result<Transformed, E> {
-    if view.is_empty() {
-        return Ok(Transformed::default());
-    }
-    let Some(times) = times else {
-        let shared = map_from_sensor(stamp_ns).ok();
-        return transform(view, range, |_| {
-            Some(shared.map_or_else(|| map_from_sensor(stamp_ns), Ok))
-        });
+) -> Result<Records, E> {
+    let time_of = |i| match times {
+        Some(times) => times.get(i).copied().filter(|at| *at != NO_TIME_NS),
+        None => Some(stamp_ns),
     };
-    let time_of = |i| times.get(i).copied().filter(|at| *at != NO_TIME_NS);
-    match Memo::new(times, &map_from_sensor) {
-        Some(memo) => transform(view, range, |i| {
-            let at_ns = time_of(i)?;
-            Some(memo.pose(i).map_or_else(|| map_from_sensor(at_ns), Ok))
-        }),
-        None => transform(view, range, |i| Some(map_from_sensor(time_of(i)?))),
+    let source = Source {
+        view,
+        range,
+        copies: Copies::new(view, &format.copied),
+        with_viewpoints: format.with_viewpoints,
+        lookup: |i| time_of(i).map(&map_from_sensor).transpose(),
+    };
+    let shared = times.is_none().then(|| map_from_sensor(stamp_ns).ok());
+    if let Some(shared) = shared.filter(|_| !view.is_empty()) {
+        return source.records(format, |_| shared.as_ref());
+    }
+    match times.and_then(|times| Memo::new(times, &map_from_sensor)) {
+        Some(memo) => source.records(format, |i| memo.pose(i)),
+        None => source.records(format, |_| None),
     }
 }
 
-/// Transforms in parallel by `pose_of` a point, which is `None` where it has no time.
-fn transform<E: Send>(
-    view: &CloudView<'_>,
-    range: &RangeLimits,
-    pose_of: impl Fn(usize) -> Option<Result<Isometry3<f64>, E>> + Sync,
-) -> Result<Transformed, E> {
-    let chunk = view
-        .len()
-        .div_ceil(rayon::current_num_threads() * CHUNKS_PER_THREAD)
-        .max(MIN_CHUNK);
-    // Collected before the first error is taken, so that it is the first in order.
-    let parts: Vec<Result<Transformed, E>> = (0..view.len().div_ceil(chunk))
-        .into_par_iter()
-        .map(|part| {
-            let first = part * chunk;
-            transform_part(view, first..view.len().min(first + chunk), range, &pose_of)
-        })
-        .collect();
-    let parts = parts.into_iter().collect::<Result<Vec<_>, E>>()?;
-    let mut all = Transformed {
-        points_m: Vec::with_capacity(parts.iter().map(|p| p.points_m.len()).sum()),
-        ..Transformed::default()
-    };
-    for part in parts {
-        all.points_m.extend_from_slice(&part.points_m);
-        all.not_finite += part.not_finite;
-        all.out_of_range += part.out_of_range;
-        all.no_time += part.no_time;
-        all.left_out.extend(part.left_out);
-    }
-    Ok(all)
+/// A cloud to transform. `lookup` gives the pose of a point, `None` where it has no time.
+struct Source<'a, L> {
+    view: &'a CloudView<'a>,
+    range: &'a RangeLimits,
+    copies: Copies,
+    with_viewpoints: bool,
+    lookup: L,
 }
 
-fn transform_part<E>(
-    view: &CloudView<'_>,
-    indices: std::ops::Range<usize>,
-    range: &RangeLimits,
-    pose_of: &impl Fn(usize) -> Option<Result<Isometry3<f64>, E>>,
-) -> Result<Transformed, E> {
-    let mut out = Transformed {
-        points_m: Vec::with_capacity(indices.len()),
-        ..Transformed::default()
-    };
-    for i in indices {
-        let p = view.xyz(i);
-        let distance_m = p.norm();
-        if !distance_m.is_finite() {
-            out.not_finite += 1;
-        } else if !(distance_m > range.min_range_m && distance_m <= range.max_range_m) {
-            out.out_of_range += 1;
-        } else if let Some(pose) = pose_of(i) {
-            out.points_m.push((pose? * Point3::from(p)).coords);
-            continue;
-        } else {
-            out.no_time += 1;
+/// Numbers of the points of a part, by what became of them.
+#[derive(Default)]
+struct Counts {
+    kept: usize,
+    not_finite: usize,
+    out_of_range: usize,
+    no_time: usize,
+    /// True if a point needs double precision.
+    is_far: bool,
+}
+
+impl<'a, E: Send, L> Source<'a, L>
+where
+    L: Fn(usize) -> Result<Option<Isometry3<f64>>, E> + Sync,
+{
+    /// `known` gives poses that were looked up before.
+    fn records<'p>(
+        &self,
+        format: &RecordFormat,
+        known: impl Fn(usize) -> Option<&'p Isometry3<f64>> + Sync,
+    ) -> Result<Records, E> {
+        let write = |precision: Precision| {
+            let (_, bytes) = format.fields(precision);
+            match precision {
+                Precision::Float32 => self.write::<false>(bytes, &known),
+                Precision::Float64 => self.write::<true>(bytes, &known),
+            }
+        };
+        if let Some(precision) = format.precision {
+            return write(precision).map(|(records, _)| records);
         }
-        out.left_out.push(i);
+        // The place of the sensor foretells in all but rare clouds whether some point needs double precision.
+        let first = known(0).map(|pose| Precision::for_point(&pose.translation.vector));
+        let first = first.unwrap_or(Precision::Float32);
+        let (records, needed) = write(first)?;
+        if needed == first {
+            return Ok(records);
+        }
+        write(needed).map(|(records, _)| records)
     }
-    Ok(out)
+
+    /// The records, of `bytes` bytes each, and the precision that their points need.
+    fn write<'p, const IS_WIDE: bool>(
+        &self,
+        bytes: usize,
+        known: &(impl Fn(usize) -> Option<&'p Isometry3<f64>> + Sync),
+    ) -> Result<(Records, Precision), E> {
+        let points = self.view.len();
+        let threads = rayon::current_num_threads();
+        let tasks = if threads == 1 {
+            1
+        } else {
+            threads * CHUNKS_PER_THREAD
+        };
+        let chunk = points.div_ceil(tasks).max(MIN_CHUNK);
+        let mut data = vec![0; points.saturating_mul(bytes)];
+        // Collected before the first error is taken, so that it is the first in order.
+        let parts: Vec<Result<Counts, E>> = data
+            .par_chunks_mut(chunk.saturating_mul(bytes))
+            .enumerate()
+            .map(|(part, out)| self.write_part::<IS_WIDE>(part * chunk, bytes, out, known))
+            .collect();
+        let mut all = Counts::default();
+        for (part, counts) in parts.into_iter().enumerate() {
+            let counts = counts?;
+            // Records move up to those before them.
+            let first = part * chunk;
+            if all.kept < first {
+                let from = first * bytes;
+                data.copy_within(from..from + counts.kept * bytes, all.kept * bytes);
+            }
+            all.kept += counts.kept;
+            all.not_finite += counts.not_finite;
+            all.out_of_range += counts.out_of_range;
+            all.no_time += counts.no_time;
+            all.is_far |= counts.is_far;
+        }
+        data.truncate(all.kept * bytes);
+        let records = Records {
+            data,
+            points: all.kept,
+            precision: if IS_WIDE {
+                Precision::Float64
+            } else {
+                Precision::Float32
+            },
+            not_finite: all.not_finite,
+            out_of_range: all.out_of_range,
+            no_time: all.no_time,
+        };
+        let needed = if all.is_far {
+            Precision::Float64
+        } else {
+            Precision::Float32
+        };
+        Ok((records, needed))
+    }
+
+    /// Writes the records of the points from `first` on to `out`, which has room for all of them.
+    fn write_part<'p, const IS_WIDE: bool>(
+        &self,
+        first: usize,
+        bytes: usize,
+        out: &mut [u8],
+        known: &impl Fn(usize) -> Option<&'p Isometry3<f64>>,
+    ) -> Result<Counts, E> {
+        let range = self.range;
+        let indices = first..first + out.len() / bytes;
+        let mut counts = Counts::default();
+        let mut places = out.chunks_exact_mut(bytes);
+        for i in indices {
+            let record = self.view.record(i);
+            let p = self.view.xyz_of(record);
+            let distance_m = p.norm();
+            if !distance_m.is_finite() {
+                counts.not_finite += 1;
+                continue;
+            }
+            if !(distance_m > range.min_range_m && distance_m <= range.max_range_m) {
+                counts.out_of_range += 1;
+                continue;
+            }
+            let looked_up;
+            let pose = match known(i) {
+                Some(pose) => pose,
+                None => {
+                    let Some(pose) = (self.lookup)(i)? else {
+                        counts.no_time += 1;
+                        continue;
+                    };
+                    looked_up = pose;
+                    &looked_up
+                }
+            };
+            let moved = (pose * Point3::from(p)).coords;
+            counts.is_far |= Precision::for_point(&moved) == Precision::Float64;
+            let Some(place) = places.next() else {
+                break;
+            };
+            let further = write_vector::<IS_WIDE>(&moved, place);
+            let further = self.copies.write(record, further);
+            if self.with_viewpoints {
+                write_vector::<IS_WIDE>(&pose.translation.vector, further);
+            }
+            counts.kept += 1;
+        }
+        Ok(counts)
+    }
 }
 
 /// Poses of the times that a cloud repeats: column by column, or row by row where the times
@@ -161,6 +267,10 @@ impl Memo {
         // for again, so that no choice of times makes it slow.
         let mut seen = vec![(NO_TIME_NS, 0_u32); 1 << MEMO_BITS];
         for &at_ns in times {
+            if at_ns == NO_TIME_NS {
+                slots.push(NO_SLOT);
+                continue;
+            }
             // Fibonacci hashing: the high bits of the product mix all bits of the time.
             let hash = (at_ns as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
             let place = seen.get_mut((hash >> (u64::BITS - MEMO_BITS)) as usize)?;
@@ -181,7 +291,8 @@ impl Memo {
         Some(Memo { slots, poses })
     }
 
-    fn pose(&self, i: usize) -> Option<Isometry3<f64>> {
-        *self.poses.get(*self.slots.get(i)? as usize)?
+    #[inline]
+    fn pose(&self, i: usize) -> Option<&Isometry3<f64>> {
+        self.poses.get(*self.slots.get(i)? as usize)?.as_ref()
     }
 }

@@ -79,21 +79,30 @@ impl<'a> CloudView<'a> {
     /// not below [`CloudView::len`].
     #[inline]
     pub fn xyz(&self, i: usize) -> Vector3<f64> {
+        self.xyz_of(self.record(i))
+    }
+
+    /// The bytes of point `i`; none if there is no such point.
+    #[inline]
+    pub(super) fn record(&self, i: usize) -> &'a [u8] {
         let start = self.point_start(i);
+        self.data.get(start..start + self.point_step).unwrap_or(&[])
+    }
+
+    /// Coordinates in a record, metres.
+    #[inline]
+    pub(super) fn xyz_of(&self, record: &[u8]) -> Vector3<f64> {
         let [x, y, z] = self.coordinates.offsets;
-        if self.coordinates.wide {
-            Vector3::new(
-                self.f64_at(start, x),
-                self.f64_at(start, y),
-                self.f64_at(start, z),
-            )
-        } else {
-            Vector3::new(
-                self.f32_at(start, x),
-                self.f32_at(start, y),
-                self.f32_at(start, z),
-            )
-        }
+        let datatype = match self.coordinates.wide {
+            true => Datatype::Float64,
+            false => Datatype::Float32,
+        };
+        let at = |offset| self.number_of(record, datatype, offset);
+        Vector3::new(at(x), at(y), at(z))
+    }
+
+    pub(super) fn is_big_endian(&self) -> bool {
+        self.big_endian
     }
 
     /// First element of `field` of point `i`, widened; NaN if it is not there.
@@ -105,26 +114,36 @@ impl<'a> CloudView<'a> {
     /// Element `n` of `field` of point `i`, widened; NaN if it is not there.
     #[inline]
     pub fn element(&self, field: &PointField, i: usize, n: u32) -> f64 {
-        let start = self.point_start(i);
-        let datatype = Datatype::from_code(field.datatype);
-        let Some(width) = datatype.filter(|_| n < field.count).map(Datatype::bytes) else {
+        let Some(datatype) = Datatype::from_code(field.datatype).filter(|_| n < field.count) else {
             return f64::NAN;
         };
-        let offset = field.offset as usize + n as usize * width as usize;
-        match Datatype::from_code(field.datatype) {
-            Some(Datatype::Float32) => self.f32_at(start, offset),
-            Some(Datatype::Float64) => self.f64_at(start, offset),
-            Some(Datatype::Uint32) => self.read(start, offset, |b| u32::from_be_bytes(b).into()),
-            Some(Datatype::Int32) => self.read(start, offset, |b| i32::from_be_bytes(b).into()),
-            Some(Datatype::Uint16) => self.read(start, offset, |b| u16::from_be_bytes(b).into()),
-            Some(Datatype::Int16) => self.read(start, offset, |b| i16::from_be_bytes(b).into()),
-            Some(Datatype::Int64) => self.read(start, offset, |b| i64::from_be_bytes(b) as f64),
-            Some(Datatype::Uint64) => self.read(start, offset, |b| u64::from_be_bytes(b) as f64),
-            Some(Datatype::Uint8 | Datatype::Bool) => {
-                self.read(start, offset, |b| u8::from_be_bytes(b).into())
-            }
-            Some(Datatype::Int8) => self.read(start, offset, |b| i8::from_be_bytes(b).into()),
-            None => f64::NAN,
+        let offset = field.offset as usize + n as usize * datatype.bytes() as usize;
+        self.number_of(self.record(i), datatype, offset)
+    }
+
+    /// Number at an offset of a record, widened; NaN if it is not there.
+    #[inline]
+    pub(super) fn number_of(&self, record: &[u8], datatype: Datatype, offset: usize) -> f64 {
+        let is_big = self.big_endian;
+        macro_rules! read {
+            ($number:ty) => {
+                number(record, offset, |bytes| match is_big {
+                    true => <$number>::from_be_bytes(bytes),
+                    false => <$number>::from_le_bytes(bytes),
+                } as f64)
+            };
+        }
+        match datatype {
+            Datatype::Float32 => read!(f32),
+            Datatype::Float64 => read!(f64),
+            Datatype::Uint32 => read!(u32),
+            Datatype::Int32 => read!(i32),
+            Datatype::Uint16 => read!(u16),
+            Datatype::Int16 => read!(i16),
+            Datatype::Int64 => read!(i64),
+            Datatype::Uint64 => read!(u64),
+            Datatype::Uint8 | Datatype::Bool => read!(u8),
+            Datatype::Int8 => read!(i8),
         }
     }
 
@@ -141,31 +160,6 @@ impl<'a> CloudView<'a> {
         })
     }
 
-    /// Appends all elements of `field` of point `i`, little endian; zeros if there is no such
-    /// point, nothing if there is no such field.
-    pub fn copy_field(&self, field: &PointField, i: usize, out: &mut Vec<u8>) {
-        let Some(width) = Datatype::from_code(field.datatype).map(Datatype::bytes) else {
-            return;
-        };
-        let width = width as usize;
-        let bytes = (field.count as usize).saturating_mul(width);
-        if bytes > self.point_step {
-            return;
-        }
-        let start = self.point_start(i).saturating_add(field.offset as usize);
-        let there = self.data.get(start..start.saturating_add(bytes));
-        let first = out.len();
-        match there {
-            Some(elements) => out.extend_from_slice(elements),
-            None => out.resize(first + bytes, 0),
-        }
-        if self.big_endian
-            && let Some(new) = out.get_mut(first..)
-        {
-            new.chunks_exact_mut(width).for_each(<[u8]>::reverse);
-        }
-    }
-
     /// First byte of point `i`, beyond the data if there is no such point.
     #[inline]
     fn point_start(&self, i: usize) -> usize {
@@ -177,36 +171,13 @@ impl<'a> CloudView<'a> {
             (i / self.width) * self.row_step + (i % self.width) * self.point_step
         }
     }
+}
 
-    #[inline]
-    fn f32_at(&self, start: usize, offset: usize) -> f64 {
-        self.read(start, offset, |b| f32::from_be_bytes(b).into())
-    }
-
-    #[inline]
-    fn f64_at(&self, start: usize, offset: usize) -> f64 {
-        self.read(start, offset, f64::from_be_bytes)
-    }
-
-    /// The value of `N` bytes, brought to big endian for `parse`; NaN beyond the data.
-    #[inline]
-    fn read<const N: usize>(
-        &self,
-        start: usize,
-        offset: usize,
-        parse: impl Fn([u8; N]) -> f64,
-    ) -> f64 {
-        let Some(mut bytes) = self
-            .data
-            .get(start.saturating_add(offset)..)
-            .and_then(|rest| rest.first_chunk::<N>())
-            .copied()
-        else {
-            return f64::NAN;
-        };
-        if !self.big_endian {
-            bytes.reverse();
-        }
-        parse(bytes)
-    }
+/// A number of `N` bytes at an offset of a record; NaN beyond it.
+#[inline]
+fn number<const N: usize>(record: &[u8], offset: usize, parse: impl Fn([u8; N]) -> f64) -> f64 {
+    let bytes = record
+        .get(offset..)
+        .and_then(|rest| rest.first_chunk::<N>());
+    bytes.map_or(f64::NAN, |bytes| parse(*bytes))
 }

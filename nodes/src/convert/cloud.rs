@@ -1,8 +1,7 @@
 //! PointCloud2 and the core's clouds.
 
-use lattice_core::cloud::{
-    Cloud, CloudError, CloudLayout, CloudLimits, Datatype, LayoutNote, PointField,
-};
+pub use lattice_core::cloud::Precision;
+use lattice_core::cloud::{Cloud, CloudError, CloudLayout, CloudLimits, LayoutNote, PointField};
 use lattice_msgs::sensor_msgs::{self, PointCloud2};
 use lattice_msgs::std_msgs::Header;
 use nalgebra::Vector3;
@@ -11,26 +10,15 @@ use serde_bytes::ByteBuf;
 /// Datums of clouds that carry f64 coordinates are multiples of this.
 const DATUM_TILE_M: f64 = 1024.0;
 
-/// Type of the coordinates of `points_enu`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Precision {
-    /// 12 bytes a point; 4 um at 64 m from the map origin, 4 mm at 64 km.
-    Float32,
-    /// 24 bytes a point; exact anywhere, but RViz does not draw it.
-    Float64,
-}
-
-/// Coordinates below this are rounded by less than 0.5 mm in single precision, m.
-const SINGLE_REACH_M: f64 = 16_384.0;
-
-impl Precision {
-    /// Single precision where it rounds the points by less than 0.5 mm, else double.
-    pub fn for_points(points_m: &[Vector3<f64>]) -> Self {
-        match points_m.iter().all(|p| p.amax() < SINGLE_REACH_M) {
-            true => Self::Float32,
-            false => Self::Float64,
-        }
-    }
+/// Fields of a core's record as those of a message.
+pub fn message_fields(fields: Vec<PointField>) -> Vec<sensor_msgs::PointField> {
+    let field = |field: PointField| sensor_msgs::PointField {
+        name: field.name,
+        offset: field.offset,
+        datatype: field.datatype,
+        count: field.count,
+    };
+    fields.into_iter().map(field).collect()
 }
 
 /// The layout of a message, mended as its data allow. Nothing is believed until [`CloudLayout::view`].
@@ -73,45 +61,16 @@ pub fn message_from_points(
     points_m: &[Vector3<f64>],
     precision: Precision,
 ) -> PointCloud2 {
-    message_with_fields(header, points_m, precision, &[], |_, _| {})
-}
-
-/// The same with further fields, of which `append` writes those of point `i`, little endian and one
-/// behind the other. Their offsets are set here.
-pub fn message_with_fields(
-    header: Header,
-    points_m: &[Vector3<f64>],
-    precision: Precision,
-    further: &[PointField],
-    mut append: impl FnMut(usize, &mut Vec<u8>),
-) -> PointCloud2 {
-    let (size, datatype) = match precision {
-        Precision::Float32 => (4_u32, sensor_msgs::PointField::FLOAT32),
-        Precision::Float64 => (8, sensor_msgs::PointField::FLOAT64),
+    let coordinates = points_m.iter().flatten();
+    let data: Vec<u8> = match precision {
+        Precision::Float32 => coordinates
+            .flat_map(|v| (*v as f32).to_le_bytes())
+            .collect(),
+        Precision::Float64 => coordinates.flat_map(|v| v.to_le_bytes()).collect(),
     };
-    let mut fields = xyz_fields(datatype, size);
-    let mut point_step = 3 * size;
-    for field in further {
-        let width = Datatype::from_code(field.datatype).map_or(0, Datatype::bytes);
-        fields.push(sensor_msgs::PointField {
-            name: field.name.clone(),
-            offset: point_step,
-            datatype: field.datatype,
-            count: field.count,
-        });
-        point_step = point_step.saturating_add(field.count.saturating_mul(width));
-    }
-    let mut data = Vec::with_capacity(points_m.len() * point_step as usize);
-    for (i, p) in points_m.iter().enumerate() {
-        for v in [p.x, p.y, p.z] {
-            match precision {
-                Precision::Float32 => data.extend_from_slice(&(v as f32).to_le_bytes()),
-                Precision::Float64 => data.extend_from_slice(&v.to_le_bytes()),
-            }
-        }
-        append(i, &mut data);
-    }
-    dense_cloud(header, fields, point_step, points_m.len(), data)
+    let size = precision.datatype().bytes();
+    let fields = xyz_fields(precision.datatype() as u8, size);
+    dense_cloud(header, fields, 3 * size, points_m.len(), data)
 }
 
 /// An unordered cloud of `points` rows of `point_step` bytes, little endian.
@@ -206,15 +165,6 @@ mod tests {
         for (point, offset) in points.iter().zip(&cloud.offsets_m) {
             assert_eq!(*offset, [point.x as f32, point.y as f32, point.z as f32]);
         }
-    }
-
-    #[test]
-    fn points_far_from_the_origin_are_given_in_double_precision() {
-        let near = [Vector3::new(16_383.0, -16_383.0, 0.0)];
-        assert_eq!(Precision::for_points(&near), Precision::Float32);
-        let far = [near[0], Vector3::new(0.0, -16_385.0, 0.0)];
-        assert_eq!(Precision::for_points(&far), Precision::Float64);
-        assert!((f64::from(16_383.25_f32 + 4e-4) - (16_383.25 + 4e-4)).abs() < 5e-4);
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub(crate) use stamp_order::StampOrder;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use lattice_core::cloud::{CloudLimits, RangeLimits, transform_points};
+use lattice_core::cloud::{CloudLimits, RangeLimits, RecordFormat, transform_records};
 use lattice_core::pose::{
     PoseBuffer, PoseBufferOptions, PoseMiss, StampedPose, TransformBuffer, TransformBufferOptions,
 };
@@ -40,7 +40,7 @@ use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::geographic_msgs::GeoPointStamped;
 use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::sensor_msgs::PointCloud2;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
 
 use self::cloud_clocks::CloudClocks;
 use self::cloud_notes::CloudNotes;
@@ -51,8 +51,7 @@ use self::pose_frames::{Reference, WaitingPose};
 use self::speed_gate::SpeedGate;
 use self::verdict::Verdict;
 use self::waiting::{Waiting, WaitingCloud};
-use crate::convert::cloud::{self, Precision};
-use crate::convert::viewpoint;
+use crate::convert::cloud;
 
 /// A step back of the receiving clock by more than this is a log that loops.
 const CLOCK_JUMP_NS: i64 = 1_000_000_000;
@@ -343,43 +342,38 @@ impl EnuTransformer {
             min_range_m: self.options.min_range_m,
             max_range_m: self.options.max_range_m,
         };
+        let format = RecordFormat::new(
+            &view,
+            &self.options.pass_fields,
+            self.options.precision,
+            self.options.viewpoints,
+        );
         let times = waiting.times.as_deref();
-        let moved = transform_points(&view, waiting.stamp_ns, times, &range, map_from_sensor)?;
+        let moved = transform_records(
+            &view,
+            waiting.stamp_ns,
+            times,
+            &range,
+            &format,
+            map_from_sensor,
+        )?;
         let mut header = message.header.clone();
         header.stamp = Time::from_ns(waiting.stamp_ns);
         header.frame_id.clone_from(&self.options.map_frame);
-        let passed = self.options.pass_fields.iter();
-        let passed = passed.filter_map(|name| view.fields().iter().find(|f| f.name == *name));
-        let passed: Vec<_> = passed.cloned().collect();
-        let by_distance = || Precision::for_points(&moved.points_m);
-        let precision = self.options.precision.unwrap_or_else(by_distance);
-        let mut fields = passed.clone();
-        let seen_from = |i: usize| {
-            let times = times.and_then(|times| times.get(i).copied());
-            let pose = map_from_sensor(times.unwrap_or(waiting.stamp_ns));
-            pose.map_or(Vector3::repeat(f64::NAN), |pose| pose.translation.vector)
-        };
-        if self.options.viewpoints {
-            fields.extend(viewpoint::viewpoint_fields(precision));
-        }
-        let mut left_out = moved.left_out.iter().copied().peekable();
-        let mut kept = (0..view.len()).filter(|i| left_out.next_if_eq(i).is_none());
-        let append = |_, data: &mut Vec<u8>| {
-            let i = kept.next().unwrap_or(view.len());
-            for field in &passed {
-                view.copy_field(field, i, data);
-            }
-            if self.options.viewpoints {
-                viewpoint::append_viewpoint(&seen_from(i), precision, data);
-            }
-        };
-        let points =
-            cloud::message_with_fields(header, &moved.points_m, precision, &fields, append);
+        let (fields, point_step) = format.fields(moved.precision);
+        let fields = cloud::message_fields(fields);
         self.counts.points_in += view.len() as u64;
-        self.counts.points_out += moved.points_m.len() as u64;
+        self.counts.points_out += moved.points as u64;
         self.counts.points_not_finite += moved.not_finite as u64;
         self.counts.points_out_of_range += moved.out_of_range as u64;
         self.counts.points_no_time += moved.no_time as u64;
-        Ok(points)
+        let point_step = u32::try_from(point_step).unwrap_or(u32::MAX);
+        Ok(cloud::dense_cloud(
+            header,
+            fields,
+            point_step,
+            moved.points,
+            moved.data,
+        ))
     }
 }

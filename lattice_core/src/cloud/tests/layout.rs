@@ -1,5 +1,10 @@
+use nalgebra::Isometry3;
+use std::convert::Infallible;
+
 use super::{F32, F64, field};
-use crate::cloud::{CloudLayout, CloudLimits, PointField, TimeSource};
+use crate::cloud::{
+    CloudLayout, CloudLimits, PointField, RangeLimits, RecordFormat, TimeSource, transform_records,
+};
 
 const LIMITS: CloudLimits = CloudLimits { max_points: 1000 };
 
@@ -202,14 +207,21 @@ fn fields_of_several_elements_come_in_either_byte_order() {
     assert_eq!(view.packed(&color, 1), None);
     assert_eq!(view.packed(&probabilities, 0), None);
 
-    let mut copied = vec![9];
-    view.copy_field(&probabilities, 0, &mut copied);
-    view.copy_field(&probabilities, 1, &mut copied);
+    let name = probabilities.name.clone();
+    let format = RecordFormat::new(
+        &view,
+        &[name.clone(), name, "of another".into()],
+        None,
+        false,
+    );
+    let range = RangeLimits {
+        min_range_m: -1.0,
+        ..RangeLimits::default()
+    };
+    let still = |_| Ok::<_, Infallible>(Isometry3::identity());
+    let records = transform_records(&view, 0, None, &range, &format, still).unwrap();
     let little = [0x0102_u16, 0x0304, 0x0506].map(u16::to_le_bytes).concat();
-    assert_eq!(copied, [&[9], &little[..], &[0; 6]].concat());
-    probabilities.count = u32::MAX;
-    view.copy_field(&probabilities, 0, &mut copied);
-    assert_eq!(copied.len(), 13, "a field of another cloud");
+    assert_eq!(records.data.get(12..), Some(&little[..]));
 }
 
 /// Mends a change of the honest layout and gives the notes, after checking that 4 points are read.
