@@ -1,14 +1,19 @@
-//! Quantizes or inserts the same points some times over, for tools that count what that takes.
+//! Quantizes, inserts or transforms the same points some times over, for tools that count what that takes.
 //!
 //! `operations OPERATION LATTICE CELL_SIDE_M FILE TIMES`, where OPERATION is batch, portable, scalar,
-//! paper27, occupancy or list, and FILE holds little-endian f32 `x y z i`; prints the number of points.
+//! paper27, occupancy, list, transform (all points at the stamp), deskew (times of 1024 columns are read, and each has its
+//! pose) or viewpoints (which are written too), and FILE holds little-endian f32 `x y z i`; prints the number of points.
 #![allow(clippy::unwrap_used)]
 
-use lattice_core::cloud::Cloud;
+use lattice_core::cloud::{
+    Cloud, CloudLayout, CloudLimits, Datatype, PointField, RangeLimits, RecordFormat, TimeOptions,
+    transform_records,
+};
 use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeKind, Simd};
 use lattice_core::voxels::{OccupancyList, VoxelList, VoxelStore};
 use lattice_lab::printed::Search27;
 use nalgebra::{Isometry3, Vector3};
+use std::convert::Infallible;
 use std::hint::black_box;
 
 fn main() {
@@ -84,6 +89,67 @@ fn of(operation: &str, lattice: &Lattice, points: Vec<[f32; 3]>) -> Box<dyn Fn()
                 }
             })
         }
+        "transform" | "deskew" | "viewpoints" => {
+            let (layout, data) = timed(&points);
+            let is_deskewed = operation != "transform";
+            let with_viewpoints = operation == "viewpoints";
+            Box::new(move || {
+                let view = layout.view(&data, &CloudLimits::default()).unwrap();
+                let options = TimeOptions::default();
+                let times = is_deskewed.then(|| view.point_times(0, &options).unwrap().times_ns);
+                let format = RecordFormat::new(&view, &[], None, with_viewpoints);
+                let times = times.flatten();
+                let range = RangeLimits::default();
+                let at = |ns| Ok::<_, Infallible>(pose(ns));
+                black_box(transform_records(
+                    &view,
+                    0,
+                    times.as_deref(),
+                    &range,
+                    &format,
+                    at,
+                ))
+                .unwrap();
+            })
+        }
         _ => panic!("no operation {operation}"),
     }
+}
+
+/// Pose of a machine that drives and turns.
+fn pose(stamp_ns: i64) -> Isometry3<f64> {
+    let t = stamp_ns as f64 * 1.0e-9;
+    Isometry3::new(Vector3::new(10.0 * t, 0.0, 2.0), Vector3::new(0.0, 0.01, t))
+}
+
+/// A cloud of records with the times of 1024 columns in 0.1 s.
+fn timed(points: &[[f32; 3]]) -> (CloudLayout, Vec<u8>) {
+    let field = |(name, offset, datatype): (&str, u32, Datatype)| PointField {
+        name: name.to_owned(),
+        offset,
+        datatype: datatype as u8,
+        count: 1,
+    };
+    let (float, number) = (Datatype::Float32, Datatype::Uint32);
+    let places = [
+        ("x", 0, float),
+        ("y", 4, float),
+        ("z", 8, float),
+        ("t", 12, number),
+    ];
+    let width = u32::try_from(points.len()).unwrap();
+    let mut data = Vec::with_capacity(16 * points.len());
+    for (i, point) in points.iter().enumerate() {
+        data.extend(point.iter().flat_map(|v| v.to_le_bytes()));
+        data.extend((i as u32 % 1024 * 97_656).to_le_bytes());
+    }
+    let layout = CloudLayout {
+        width,
+        height: 1,
+        point_step: 16,
+        row_step: 16 * width,
+        is_bigendian: false,
+        fields: places.map(field).into(),
+    };
+    (layout, data)
 }
