@@ -177,7 +177,9 @@ fn draw(clouds: usize, chunk_bytes: usize, stop: bool) {
         .publisher::<PointCloud2>("/points_enu", Qos::reliable(clouds))
         .unwrap();
     let (sender, joined) = channel();
-    points.on_subscriber_joined(move || drop(sender.send(())));
+    points.on_subscriber_joined(move || {
+        let _ = sender.send(());
+    });
     joined.recv_timeout(PATIENCE).unwrap();
     let start = |(python, kind): &(PathBuf, &str)| Viewer::start(python, kind, &domain, &file);
     let mut viewers: Vec<Viewer> = pythons.iter().map(start).collect();
