@@ -45,13 +45,24 @@ const CHANGES: [Change; 8] = [
             "    else if (ddsi_vendor_is_eclipse (pwr->c.vendor) || lattice_is_of_service (pwr->c.xqos))\n",
         )],
     },
-    // Fast DDS answers a reader that asks where its writer stands at once only if it asks for number 0.
+    // Fast DDS answers a reader that asks where its writer stands at once only if it asks for number 0, and each question
+    // only once, by its count. Where one or its answer is lost, it is asked again after 0.1 s, not after 1 s.
     Change {
         file: "core/ddsi/src/ddsi_acknack.c",
-        pieces: &[(
-            "  an->readerSNState.bitmap_base = ddsi_to_seqno (1);",
-            "  an->readerSNState.bitmap_base = ddsi_to_seqno (lattice_first_asked_for (pwr->c.vendor.id));",
-        )],
+        pieces: &[
+            (
+                "  an->readerSNState.bitmap_base = ddsi_to_seqno (1);",
+                "  an->readerSNState.bitmap_base = ddsi_to_seqno (lattice_first_asked_for (pwr->c.vendor.id));",
+            ),
+            (
+                "  *countp = 0;\n",
+                "  *countp = lattice_first_asked_for (pwr->c.vendor.id) == 0 ? rwn->count++ : 0;\n",
+            ),
+            (
+                "  if (age <= DDS_SECS (10))\n    return DDS_SECS (1);\n",
+                "  if (age <= DDS_SECS (1))\n    return DDS_MSECS (100);\n  else if (age <= DDS_SECS (10))\n    return DDS_SECS (1);\n",
+            ),
+        ],
     },
     // Forged participants are no end of memory.
     Change {

@@ -303,6 +303,12 @@ pub(crate) trait SampleReader: Send + Sync {
     /// Bytes of the last sample, encapsulation header first.
     fn bytes(&self) -> MutexGuard<'_, Vec<u8>>;
 
+    /// True once a matched writer is known to have matched too, so that its next sample comes here. Always, where the
+    /// transport finds the way by itself.
+    fn is_known_to(&self, _: &EndpointId) -> bool {
+        true
+    }
+
     /// Counters of the samples that are not had; clones share them.
     fn losses(&self) -> ReaderLosses;
 }

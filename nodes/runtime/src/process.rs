@@ -9,6 +9,7 @@ use super::env::Network;
 use super::error::RuntimeError;
 use super::logger_services;
 use super::node::Node;
+use super::outbox::WhenFull;
 use super::param_services;
 use super::qos::Qos;
 use super::ros_args::RosArgs;
@@ -123,9 +124,9 @@ impl Runtime {
 
     fn publish_log(&self) -> Result<Arc<rosout::Listener>, RuntimeError> {
         let topic = self.main.resolve("/rosout")?;
-        let publisher = self
-            .shared
-            .publisher(self.main.id(), &topic, &Qos::ROSOUT)?;
+        let publisher =
+            self.shared
+                .publisher(self.main.id(), &topic, &Qos::ROSOUT, WhenFull::Drop)?;
         let (listener, records) = rosout::listen();
         if let Some(task) = self.shared.io.spawn(rosout::publish(records, publisher)) {
             task.detach();
@@ -135,9 +136,12 @@ impl Runtime {
 
     fn publish_diagnostics(&self) -> Result<(), RuntimeError> {
         let topic = self.main.resolve("/diagnostics")?;
-        let publisher =
-            self.shared
-                .publisher::<DiagnosticArray>(self.main.id(), &topic, &Qos::DIAGNOSTICS)?;
+        let publisher = self.shared.publisher::<DiagnosticArray>(
+            self.main.id(),
+            &topic,
+            &Qos::DIAGNOSTICS,
+            WhenFull::Drop,
+        )?;
         let shared = Arc::downgrade(&self.shared);
         let (clock, fqn) = (self.main.clock(), self.main.fqn().to_owned());
         let timer = self.timer(DIAGNOSTICS_PERIOD, move || {

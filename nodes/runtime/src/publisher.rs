@@ -196,6 +196,12 @@ macro_rules! shared_by_publishers {
                 self.parts.writer.flush(timeout)
             }
 
+            /// True if no message waits in the queue and every reliable subscriber in another process has
+            /// acknowledged all. Over Zenoh, which knows no acknowledgements: handed over to the link.
+            pub fn is_acknowledged(&self) -> bool {
+                self.parts.writer.is_acknowledged()
+            }
+
             /// Messages not sent to other processes: queue or send window full.
             pub fn dropped(&self) -> u64 {
                 self.parts.writer.dropped()

@@ -60,6 +60,9 @@ pub struct MarkerReport {
     pub published_bytes: u64,
     /// Arrays that the publisher did not take or could not send.
     pub arrays_not_published: u64,
+    /// Changed blocks that were not sent by the end.
+    #[serde(default)]
+    pub blocks_not_drawn: usize,
     /// Chunks of the map that found the inbox, or the queue before it, full.
     #[serde(default)]
     pub inbox_full: u64,
@@ -156,7 +159,7 @@ impl VoxelMarkers {
         self.dirty = self.blocks.ids().collect();
     }
 
-    /// Takes away all that viewers show and draws everything again, after a loss of unknown markers.
+    /// Takes away all that viewers show and draws everything again.
     pub fn wipe(&mut self) {
         self.wipe = true;
         self.redraw();
@@ -166,6 +169,11 @@ impl VoxelMarkers {
     /// called once a second.
     pub fn wait_a_second(&mut self) -> bool {
         self.follower.wait_a_second()
+    }
+
+    /// Blocks that changed since they were drawn.
+    pub fn blocks_due(&self) -> usize {
+        self.dirty.len()
     }
 
     /// True if there is something to publish.

@@ -19,6 +19,10 @@ use lattice_runtime::{Diagnostics, Level, Publisher, Runtime, Undecoded};
 /// Longest wait for readers at the end.
 const FLUSH: Duration = Duration::from_secs(1);
 
+/// Time after which a subscriber that does not acknowledge is a warning: two heartbeats of Fast DDS, which is the
+/// slowest to repair.
+const LATE: Duration = Duration::from_secs(6);
+
 /// Event for the compute thread.
 enum Event {
     Map(Undecoded<LatticeMap>),
@@ -34,7 +38,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
     let settings = Settings::from_params(params)?;
-    let publisher = node.publisher("voxel_markers", Qos::MARKERS)?;
+    let publisher = node.lossless_publisher("voxel_markers", Qos::MARKERS)?;
     let losses = MapLosses::default();
     let mut shell = Shell {
         input: MapRequests::new(&node, &settings.mapper, &losses)?,
@@ -43,9 +47,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         diagnostics: node.diagnostics(),
         seconds: Throttle::new(Duration::from_secs(1)),
         budget_bytes: settings.budget_bytes,
-        arrays_lost: 0,
-        incomplete: false,
-        repairs: Throttle::new(Duration::from_secs(5)),
+        waits_since: None,
         report_file: settings.report_file,
     };
     let compute = Compute::spawn(
@@ -86,10 +88,8 @@ struct Shell {
     diagnostics: Diagnostics,
     seconds: Throttle,
     budget_bytes: usize,
-    /// Arrays lost by the publisher after which all is drawn again.
-    arrays_lost: u64,
-    incomplete: bool,
-    repairs: Throttle,
+    /// Begin of the wait for a subscriber that has not acknowledged the markers before.
+    waits_since: Option<Instant>,
     report_file: String,
 }
 
@@ -110,7 +110,6 @@ impl Shell {
                 if self.seconds.check().is_some() && self.machine.wait_a_second() {
                     self.input.ask_for_keyframe();
                 }
-                self.repair();
                 self.draw();
                 self.diagnose();
             }
@@ -122,7 +121,14 @@ impl Shell {
         }
     }
 
+    /// Publishes changed blocks once the markers before are acknowledged. Until then further changes add up, and a
+    /// block that changed many times is sent once.
     fn draw(&mut self) {
+        if !self.markers.is_acknowledged() {
+            self.waits_since.get_or_insert_with(Instant::now);
+            return;
+        }
+        self.waits_since = None;
         if !self.machine.is_dirty() {
             return;
         }
@@ -133,32 +139,36 @@ impl Shell {
         }
     }
 
-    /// Draws again after a loss, but not as fast as arrays are lost.
-    fn repair(&mut self) {
-        let lost = self.markers.dropped();
-        self.incomplete |= lost != self.arrays_lost;
-        self.arrays_lost = lost;
-        if self.incomplete && self.repairs.check().is_some() {
-            self.incomplete = false;
-            self.machine.wipe();
-        }
-    }
-
     fn diagnose(&self) {
         let counts = self.machine.counts();
-        let (level, message) = match (counts.messages_in, counts.messages_refused) {
-            (0, _) => (Level::Warn, "no map yet".to_owned()),
-            (_, 0) => (Level::Ok, format!("{:?}", self.machine.style())),
-            (_, refused) => (Level::Warn, format!("{refused} messages refused")),
+        let waits = self.waits_since.map(|since| since.elapsed());
+        let late = waits.filter(|waits| *waits > LATE);
+        let lost = self.markers.dropped();
+        let (level, message) = match (counts.messages_in, counts.messages_refused, late) {
+            (_, _, Some(waits)) => {
+                let seconds = waits.as_secs();
+                let text = format!(
+                    "a subscriber has not acknowledged for {seconds} s: no markers until it does or goes"
+                );
+                (Level::Warn, text)
+            }
+            (0, ..) => (Level::Warn, "no map yet".to_owned()),
+            (_, 0, None) if lost > 0 => {
+                let text =
+                    format!("{lost} arrays not published: the queue is full; lower block_bits");
+                (Level::Warn, text)
+            }
+            (_, 0, None) => (Level::Ok, format!("{:?}", self.machine.style())),
+            (_, refused, None) => (Level::Warn, format!("{refused} messages refused")),
         };
         let mut values = report::key_values(counts);
         let losses = self.input.losses();
-        let (undecodable, arrays) = (losses.undecodable(), self.markers.dropped());
+        let undecodable = losses.undecodable();
         values.push(("inbox_full".into(), losses.inbox_full().to_string()));
         let on_network = losses.on_network();
         values.push(("lost_on_network".into(), on_network.to_string()));
         values.push(("undecodable".into(), undecodable.to_string()));
-        values.push(("arrays_not_published".into(), arrays.to_string()));
+        values.push(("arrays_not_published".into(), lost.to_string()));
         let differences = self.machine.map_differences();
         values.push(("map_differences".into(), differences.to_string()));
         values.push(("voxels".into(), self.machine.voxels().to_string()));
@@ -176,6 +186,14 @@ impl Shell {
         {
             self.draw();
         }
+        let blocks_not_drawn = self.machine.blocks_due();
+        if blocks_not_drawn > 0 && self.markers.subscriber_count() > 0 {
+            log::warn!(
+                "{}: {blocks_not_drawn} changed blocks are not sent: subscribers have not acknowledged the others within \
+                 {FLUSH:?}",
+                self.markers.topic()
+            );
+        }
         let counts = self.machine.counts().clone();
         let report = MarkerReport {
             counts,
@@ -183,6 +201,7 @@ impl Shell {
             marker_bytes: self.machine.drawn_bytes(),
             published_bytes: self.markers.sent_bytes(),
             arrays_not_published: self.markers.dropped(),
+            blocks_not_drawn,
             inbox_full: self.input.losses().inbox_full(),
             lost_on_network: self.input.losses().on_network(),
             undecodable: self.input.losses().undecodable(),

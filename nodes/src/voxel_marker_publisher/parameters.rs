@@ -7,6 +7,7 @@ use crate::compute::ComputeLimits;
 use crate::{options, report};
 use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
+use lattice_runtime::qos::Qos;
 
 const ABOUT: &[About] = about! {
     "style": "cells (true cell shapes, exposed faces only), cubes or points.";
@@ -39,15 +40,18 @@ impl Settings {
         params.describe(options::COMMON);
         let rate_hz = params.f64_in("rate_hz", 5.0, 0.1..=100.0)?;
         let bytes_per_s = params.positive("max_bytes_per_s", 20_000_000)?;
+        let markers = MarkerOptions::from_params(params)?;
+        // Two arrays in a row are longer than one may be, so these find room in the history and in the queue.
+        let most_bytes = Qos::MARKERS.depth / 2 * markers.chunk_bytes;
         Ok(Self {
-            markers: MarkerOptions::from_params(params)?,
             limits: ComputeLimits {
                 events: options::inbox_events(params, 4096)?,
                 bytes: options::inbox_bytes(params, 64 << 20)?,
                 threads: options::threads(params, 1)?,
             },
             period: Duration::from_secs_f64(1.0 / rate_hz),
-            budget_bytes: (bytes_per_s as f64 / rate_hz) as usize,
+            budget_bytes: ((bytes_per_s as f64 / rate_hz) as usize).min(most_bytes),
+            markers,
             mapper: params.string("mapper", "lattice_mapper")?,
             report_file: report::file(params)?,
         })

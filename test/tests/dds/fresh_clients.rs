@@ -282,7 +282,6 @@ fn our_fresh_clients_are_answered_by_fast_dds() {
 }
 
 #[test]
-#[ignore = "of 20 calls one was lost in one of two runs"]
 fn our_fresh_clients_are_answered_by_fast_dds_despite_loss() {
     answered_by_rclpy(20, LOSS);
 }

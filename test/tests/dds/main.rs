@@ -9,6 +9,7 @@ mod fresh_clients;
 mod headset;
 mod losses;
 mod machines;
+mod markers;
 mod network;
 mod octomap;
 mod params;

@@ -1,6 +1,7 @@
 //! Nodes and runtime over Zenoh, against foreign peers. Tests of every transport run over it too: `.ci/zenoh`.
 #![allow(clippy::unwrap_used)]
 
+mod actions;
 mod foreign;
 mod mapping;
 mod scouting;

@@ -12,7 +12,7 @@ use lattice_test::python::zenoh_python;
 
 use super::{PATIENCE, Site, hear};
 
-fn call<S: RosService>(node: &Node, name: &str, request: &S::Request) -> S::Response {
+pub fn call<S: RosService>(node: &Node, name: &str, request: &S::Request) -> S::Response {
     let client = node.client::<S>(name).unwrap();
     let request = cdr::to_vec(request).unwrap();
     let answer = smol::block_on(client.call(request, PATIENCE)).unwrap();

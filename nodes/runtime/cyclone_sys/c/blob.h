@@ -48,6 +48,10 @@ bool lattice_is_full (dds_entity_t writer, size_t length, size_t most);
 /* Samples of a writer that not all of its reliable readers have acknowledged. */
 uint64_t lattice_unacknowledged (dds_entity_t writer);
 
+/* True if a reader has heard from a writer where that stands, which a writer says to the readers that it knows. Also where
+   there is no such writer. */
+bool lattice_is_known_to (dds_entity_t reader, const uint8_t writer[16]);
+
 /* Has a function called with the argument of the writer's listener for matches when a reliable reader has left, and the
    samples that it did not acknowledge. */
 void lattice_on_reader_left (void (*callback) (void *, uint64_t));

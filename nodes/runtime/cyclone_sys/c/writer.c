@@ -1,9 +1,16 @@
 #include "blob.h"
 
 #include "dds/ddsi/ddsi_entity.h"
+#include <string.h>
+
+#include "dds/ddsi/ddsi_domaingv.h"
 #include "dds/ddsi/ddsi_endpoint.h"
+#include "dds/ddsi/ddsi_entity_index.h"
+#include "dds/ddsi/ddsi_guid.h"
 #include "dds/ddsi/ddsi_proxy_endpoint.h"
+#include "dds/ddsi/ddsi_thread.h"
 #include "dds/ddsi/ddsi_whc.h"
+#include "dds__entity.h"
 #include "dds__types.h"
 #include "dds__writer.h"
 #include "ddsi__endpoint.h"
@@ -49,6 +56,30 @@ uint64_t lattice_unacknowledged (dds_entity_t writer)
   ddsrt_mutex_unlock (&inner->e.lock);
   dds_writer_unlock (locked);
   return written > acknowledged ? written - acknowledged : 0;
+}
+
+bool lattice_is_known_to (dds_entity_t reader, const uint8_t writer[16])
+{
+  struct dds_entity *entity;
+  if (dds_entity_pin (reader, &entity) != DDS_RETCODE_OK)
+    return true;
+  ddsi_guid_t guid;
+  _Static_assert (sizeof (guid) == 16, "GUID");
+  memcpy (&guid, writer, sizeof (guid));
+  guid = ddsi_ntoh_guid (guid);
+  struct ddsi_domaingv *domain = &entity->m_domain->gv;
+  ddsi_thread_state_awake (ddsi_lookup_thread_state (), domain);
+  struct ddsi_proxy_writer *proxy = ddsi_entidx_lookup_proxy_writer_guid (domain->entity_index, &guid);
+  bool known = true;
+  if (proxy != NULL)
+  {
+    ddsrt_mutex_lock (&proxy->e.lock);
+    known = proxy->have_seen_heartbeat;
+    ddsrt_mutex_unlock (&proxy->e.lock);
+  }
+  ddsi_thread_state_asleep (ddsi_lookup_thread_state ());
+  dds_entity_unpin (entity);
+  return known;
 }
 
 void lattice_on_reader_left (void (*callback) (void *, uint64_t))

@@ -176,6 +176,7 @@ unsafe extern "C" {
     ) -> dds_entity_t;
     pub fn lattice_is_full(writer: dds_entity_t, length: usize, most: usize) -> bool;
     pub fn lattice_unacknowledged(writer: dds_entity_t) -> u64;
+    pub fn lattice_is_known_to(reader: dds_entity_t, writer: *const u8) -> bool;
     pub fn lattice_on_reader_left(callback: Option<unsafe extern "C" fn(*mut c_void, u64)>);
     pub fn lattice_take(reader: dds_entity_t, sample: *mut lattice_sample) -> dds_return_t;
     pub fn lattice_release(blob: *mut ddsi_serdata);

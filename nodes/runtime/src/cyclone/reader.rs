@@ -4,7 +4,7 @@ use std::ptr;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::{Context, Poll};
 
-use lattice_cyclone_sys::dds_create_reader;
+use lattice_cyclone_sys::{dds_create_reader, lattice_is_known_to};
 use smol::channel::Sender;
 
 use super::endpoint::{Description, Endpoint};
@@ -85,6 +85,11 @@ impl SampleReader for CycloneReader {
 
     fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {
         lock(&self.buffer)
+    }
+
+    fn is_known_to(&self, writer: &EndpointId) -> bool {
+        // SAFETY: a handle, and 16 bytes that are read during the call.
+        unsafe { lattice_is_known_to(self.reader.handle(), writer.0.as_ptr()) }
     }
 
     fn losses(&self) -> ReaderLosses {

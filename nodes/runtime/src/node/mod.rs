@@ -15,6 +15,7 @@ use super::gate::Gate;
 use super::graph::NodeId;
 use super::names::{self, NameKind};
 use super::neighbours::GraphEndpoint;
+use super::outbox::WhenFull;
 use super::params::Params;
 use super::publisher::{Publisher, RawPublisher};
 use super::qos::{Durability, Qos};
@@ -150,9 +151,29 @@ impl Node {
         topic: &str,
         qos: Qos,
     ) -> Result<Publisher<M>, RuntimeError> {
+        self.publisher_when_full(topic, qos, WhenFull::Drop)
+    }
+
+    /// A publisher that drops nothing for a reliable subscriber which does not keep up: messages wait in its
+    /// queue. That is bounded, so publish only while [`Publisher::is_acknowledged`].
+    pub fn lossless_publisher<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+    ) -> Result<Publisher<M>, RuntimeError> {
+        self.publisher_when_full(topic, qos, WhenFull::Wait)
+    }
+
+    fn publisher_when_full<M: RosMessage>(
+        &self,
+        topic: &str,
+        qos: Qos,
+        when_full: WhenFull,
+    ) -> Result<Publisher<M>, RuntimeError> {
         let resolved = self.resolve(topic)?;
         let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;
-        let mut publisher = self.inner.shared.publisher(self.id(), &resolved, &qos)?;
+        let shared = &self.inner.shared;
+        let mut publisher = shared.publisher(self.id(), &resolved, &qos, when_full)?;
         self.inner.gate.watch(&publisher.parts.peers);
         publisher.gate = Some(Arc::clone(&self.inner.gate));
         Ok(publisher)
@@ -165,7 +186,8 @@ impl Node {
         qos: Qos,
     ) -> Result<Publisher<M>, RuntimeError> {
         let resolved = self.resolve(topic)?;
-        self.inner.shared.publisher(self.id(), &resolved, &qos)
+        let shared = &self.inner.shared;
+        shared.publisher(self.id(), &resolved, &qos, WhenFull::Drop)
     }
 
     /// A publisher of CDR bytes of the type, such as `sensor_msgs/msg/Imu`, on a full topic name.

@@ -8,7 +8,8 @@ mod budget;
 mod tests;
 
 use std::cell::Cell;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -79,6 +80,8 @@ struct Shared {
     budget: Budget,
     when_full: WhenFull,
     last_bytes: AtomicUsize,
+    /// Samples in the queue, and the one that is being written.
+    waiting: AtomicUsize,
     dropped: AtomicU64,
     sent: AtomicU64,
     sent_bytes: AtomicU64,
@@ -103,6 +106,7 @@ impl Outbox {
             budget: Budget::new(queue_bytes),
             when_full,
             last_bytes: AtomicUsize::new(0),
+            waiting: AtomicUsize::new(0),
             dropped: AtomicU64::new(0),
             sent: AtomicU64::new(0),
             sent_bytes: AtomicU64::new(0),
@@ -144,6 +148,13 @@ impl Outbox {
         writer.map_or(0, |writer| writer.unacknowledged())
     }
 
+    /// True if nothing waits in the queue and every reliable reader has acknowledged. Does not wait.
+    pub(crate) fn is_acknowledged(&self) -> bool {
+        let acknowledged =
+            |writer: Arc<dyn SampleWriter>| writer.wait_for_acknowledgments(Duration::ZERO);
+        self.shared.waiting.load(Acquire) == 0 && self.shared.writer().is_none_or(acknowledged)
+    }
+
     /// Queues a sample that is serialized later. Its size is taken to be that of the one before.
     pub(crate) fn send(&self, serialize: Serialize) -> Result<(), PublishError> {
         let bytes = self.shared.last_bytes.load(Relaxed);
@@ -180,6 +191,7 @@ impl Outbox {
                 reserved,
                 related: None,
             };
+            self.shared.waiting.fetch_add(1, Relaxed);
             self.jobs.send(job).await.map_err(|_| self.closed())
         };
         let ended = async {
@@ -192,7 +204,7 @@ impl Outbox {
         };
         let outcome = smol::block_on(or(queued, or(ended, too_long)));
         if outcome.is_err() && taken.get() {
-            self.shared.budget.give_back(reserved);
+            self.shared.done(reserved);
         }
         outcome
     }
@@ -254,8 +266,9 @@ impl Outbox {
             reserved,
             related,
         };
+        self.shared.waiting.fetch_add(1, Relaxed);
         self.jobs.try_send(job).map_err(|error| {
-            self.shared.budget.give_back(reserved);
+            self.shared.done(reserved);
             match error {
                 TrySendError::Full(_) => self.full(),
                 TrySendError::Closed(_) => self.closed(),
@@ -281,6 +294,12 @@ impl Outbox {
 impl Shared {
     fn writer(&self) -> Option<Arc<dyn SampleWriter>> {
         lock(&self.writer).clone()
+    }
+
+    /// A sample is out of the queue, sent or not.
+    fn done(&self, reserved: usize) {
+        self.waiting.fetch_sub(1, Release);
+        self.budget.give_back(reserved);
     }
 
     fn drop_one(&self, why: &str) {
@@ -366,7 +385,7 @@ async fn serve(shared: Arc<Shared>, queue: Receiver<Job>) {
                 if let Some(body) = shared.body(content) {
                     shared.write(body, related).await;
                 }
-                shared.budget.give_back(reserved);
+                shared.done(reserved);
             }
             Job::Flush(done) => {
                 // Nobody may be waiting any more.

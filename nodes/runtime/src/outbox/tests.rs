@@ -25,6 +25,43 @@ impl SampleWriter for Stuck {
     }
 }
 
+/// A writer whose readers acknowledge at once.
+struct Prompt;
+
+impl SampleWriter for Prompt {
+    fn id(&self) -> EndpointId {
+        EndpointId([8; 16])
+    }
+
+    fn write(&self, _: Bytes, _: Option<SampleId>) -> BoxFuture<'_, Result<(), WriteRefusal>> {
+        Box::pin(async { Ok(()) })
+    }
+
+    fn wait_for_acknowledgments(&self, _: Duration) -> bool {
+        true
+    }
+}
+
+#[test]
+fn all_is_acknowledged_once_the_queue_is_empty() {
+    let (outbox, task) = Outbox::new("/chatter", Arc::new(Prompt), WhenFull::Wait, 1, usize::MAX);
+    assert!(outbox.is_acknowledged());
+    outbox.send_body(Bytes::from_static(b"body"), None).unwrap();
+    // Refused, and so not waited for.
+    assert!(outbox.send_body(Bytes::from_static(b"more"), None).is_err());
+    assert!(!outbox.is_acknowledged());
+    let flushed = smol::block_on(or(async { outbox.flushed().await.is_some() }, async {
+        task.await;
+        false
+    }));
+    assert!(flushed && outbox.is_acknowledged());
+    outbox.close();
+    assert!(
+        outbox.is_acknowledged(),
+        "nothing is waited for after the end"
+    );
+}
+
 #[test]
 fn who_waits_for_a_full_queue_goes_on_in_time_and_at_the_end() {
     let (outbox, _task) = Outbox::new("/chatter", Arc::new(Stuck), WhenFull::Wait, 1, usize::MAX);

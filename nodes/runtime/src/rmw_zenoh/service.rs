@@ -2,8 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::{Arc, Mutex, MutexGuard};
-use std::task::{Context, Poll};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use futures::future::BoxFuture;
@@ -15,10 +14,10 @@ use zenoh::sample::Locality;
 use super::attachment::{attachment, read};
 use super::graph::Place;
 use super::publisher::{InTurn, payload};
-use super::subscriber::Inbox;
+use super::subscriber::{Inbox, InboxReader};
 use crate::port::{
-    Bytes, ClientEnds, EndpointId, Origin, ReaderLosses, SampleId, SampleReader, SampleWriter,
-    ServerEnds, ServiceForm, ServiceQos, WriteRefusal,
+    Bytes, ClientEnds, EndpointId, Origin, SampleId, SampleWriter, ServerEnds, ServiceForm,
+    ServiceQos, WriteRefusal,
 };
 use crate::sync::lock;
 
@@ -35,7 +34,6 @@ type Announced = (LivelinessToken, Place);
 struct Server {
     id: EndpointId,
     key: String,
-    inbox: Arc<Inbox>,
     pending: Arc<Pending>,
     queue: InTurn,
     _announced: Announced,
@@ -92,7 +90,6 @@ pub(super) fn serve(
     let server = Arc::new(Server {
         id,
         key,
-        inbox,
         pending,
         queue: InTurn::default(),
         _announced: announce()?,
@@ -100,7 +97,11 @@ pub(super) fn serve(
     });
     Ok(ServerEnds {
         form: ServiceForm::Queries,
-        requests: Box::new(Requests(Arc::clone(&server))),
+        requests: Box::new(InboxReader {
+            id,
+            inbox,
+            _source: Arc::clone(&server),
+        }),
         replies: Arc::new(Replies(server)),
     })
 }
@@ -117,26 +118,6 @@ fn ask(query: Query, inbox: &Inbox, pending: &Pending) {
         inbox.losses().overrun.fetch_add(1, Relaxed);
     }
     inbox.push(payload, origin);
-}
-
-struct Requests(Arc<Server>);
-
-impl SampleReader for Requests {
-    fn id(&self) -> EndpointId {
-        self.0.id
-    }
-
-    fn poll_next(&self, context: &mut Context<'_>) -> Poll<Result<Origin, String>> {
-        self.0.inbox.poll_next(context)
-    }
-
-    fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {
-        self.0.inbox.bytes()
-    }
-
-    fn losses(&self) -> ReaderLosses {
-        self.0.inbox.losses().clone()
-    }
 }
 
 struct Replies(Arc<Server>);
@@ -186,18 +167,23 @@ pub(super) fn call(
     qos: &ServiceQos,
     announce: impl FnOnce() -> zenoh::Result<Announced>,
 ) -> zenoh::Result<ClientEnds> {
+    let inbox = Inbox::new(qos.reader.depth, qos.max_bytes);
     let client = Arc::new(Client {
         id,
         session: session.clone(),
         key,
-        inbox: Inbox::new(qos.reader.depth, qos.max_bytes),
+        inbox: Arc::clone(&inbox),
         queue: InTurn::default(),
         _announced: announce()?,
     });
     Ok(ClientEnds {
         form: ServiceForm::Queries,
         requests: Arc::new(Calls(Arc::clone(&client))),
-        answers: Box::new(Answers(client)),
+        answers: Box::new(InboxReader {
+            id: other_end(id),
+            inbox,
+            _source: client,
+        }),
     })
 }
 
@@ -247,25 +233,5 @@ impl SampleWriter for Calls {
 
     fn wait_for_acknowledgments(&self, patience: Duration) -> bool {
         self.0.queue.wait(patience)
-    }
-}
-
-struct Answers(Arc<Client>);
-
-impl SampleReader for Answers {
-    fn id(&self) -> EndpointId {
-        other_end(self.0.id)
-    }
-
-    fn poll_next(&self, context: &mut Context<'_>) -> Poll<Result<Origin, String>> {
-        self.0.inbox.poll_next(context)
-    }
-
-    fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {
-        self.0.inbox.bytes()
-    }
-
-    fn losses(&self) -> ReaderLosses {
-        self.0.inbox.losses().clone()
     }
 }

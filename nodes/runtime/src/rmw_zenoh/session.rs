@@ -18,7 +18,7 @@ use super::graph::{Graph, Place};
 use super::keys::{Channel, Kind, Session, gid};
 use super::publisher::ZenohPublisher;
 use super::service;
-use super::subscriber::ZenohSubscription;
+use super::subscriber::InboxReader;
 use crate::env::Network;
 use crate::error::RuntimeError;
 use crate::port::{
@@ -56,8 +56,8 @@ impl Zenoh {
         let failed = |reason: String| RuntimeError::Session { reason };
         if enclave.secrets.is_some() {
             return Err(failed(
-                "ROS_SECURITY_ENABLE is true, which secures DDS alone; unset it, and secure Zenoh by TLS in \
-                 ZENOH_SESSION_CONFIG_URI"
+                "ROS_SECURITY_ENABLE is true, which secures DDS alone; unset it, and let the Zenoh router of each \
+                 machine speak TLS to the others"
                     .to_owned(),
             ));
         }
@@ -238,7 +238,7 @@ impl Transport for Zenoh {
         let channel = channel(of.name, of.ros_type, of.type_hash)?;
         let made = self.prepare(of.node, Kind::Subscription, channel, qos);
         let (session, key, announce) = (&self.session, self.key(&made), || self.announce(&made));
-        let reader = ZenohSubscription::new(session, key, qos, max_bytes, &self.graph, announce);
+        let reader = InboxReader::subscribe(session, key, qos, max_bytes, &self.graph, announce);
         let reader = reader.map_err(|error| failed(of.name, "subscription", error))?;
         Ok(Box::new(reader))
     }

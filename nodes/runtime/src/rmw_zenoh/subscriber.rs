@@ -60,7 +60,7 @@ impl Inbox {
         self.arrivals.take_from(|| one.next());
     }
 
-    pub(super) fn poll_next(&self, context: &mut Context<'_>) -> Poll<Result<Origin, String>> {
+    fn poll_next(&self, context: &mut Context<'_>) -> Poll<Result<Origin, String>> {
         self.arrivals.poll_next(context).map(|arrival| {
             let (payload, origin) = arrival?;
             let mut buffer = lock(&self.buffer);
@@ -70,10 +70,6 @@ impl Inbox {
                 .for_each(|slice| buffer.extend_from_slice(slice));
             Ok(origin)
         })
-    }
-
-    pub(super) fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {
-        lock(&self.buffer)
     }
 
     /// Samples that are not had.
@@ -108,10 +104,15 @@ impl Numbers {
     }
 }
 
-/// Reads samples of one topic.
-pub(super) struct ZenohSubscription {
-    id: EndpointId,
-    inbox: Arc<Inbox>,
+/// Reads an inbox, and holds its source.
+pub(super) struct InboxReader<S> {
+    pub id: EndpointId,
+    pub inbox: Arc<Inbox>,
+    pub _source: S,
+}
+
+/// Source of a subscription.
+pub(super) struct Subscribed {
     // In this order: the token goes before the subscription.
     _token: LivelinessToken,
     _place: Place,
@@ -125,8 +126,9 @@ enum Receiver {
     WithHistory(AdvancedSubscriber<()>),
 }
 
-impl ZenohSubscription {
-    pub(super) fn new(
+impl InboxReader<Subscribed> {
+    /// Reads samples of one topic.
+    pub(super) fn subscribe(
         session: &zenoh::Session,
         (id, key): (EndpointId, String),
         qos: &Qos,
@@ -168,9 +170,11 @@ impl ZenohSubscription {
         Ok(Self {
             id,
             inbox,
-            _token: token,
-            _place: place,
-            _receiver: receiver,
+            _source: Subscribed {
+                _token: token,
+                _place: place,
+                _receiver: receiver,
+            },
         })
     }
 }
@@ -192,7 +196,7 @@ fn take(sample: &Sample, inbox: &Inbox, numbers: &Numbers, graph: &Graph) {
     inbox.push(sample.payload().clone(), origin);
 }
 
-impl SampleReader for ZenohSubscription {
+impl<S: Send + Sync> SampleReader for InboxReader<S> {
     fn id(&self) -> EndpointId {
         self.id
     }
@@ -202,7 +206,7 @@ impl SampleReader for ZenohSubscription {
     }
 
     fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {
-        self.inbox.bytes()
+        lock(&self.inbox.buffer)
     }
 
     fn losses(&self) -> ReaderLosses {
@@ -248,6 +252,6 @@ mod tests {
         assert!(matches!(next(), Poll::Ready(Err(why)) if why.contains("max_message_bytes = 8")));
         assert!(matches!(next(), Poll::Ready(Err(why)) if why.contains("has no name")));
         assert!(matches!(next(), Poll::Ready(Ok(_))));
-        assert_eq!(*inbox.bytes(), [7; 8]);
+        assert_eq!(*lock(&inbox.buffer), [7; 8]);
     }
 }

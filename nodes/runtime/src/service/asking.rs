@@ -3,14 +3,23 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
+use smol::Timer;
 use smol::channel::{Sender, bounded};
 
 use super::wire::{Header, read_answer, write_request};
 use crate::outbox::Outbox;
 use crate::peers::Peers;
-use crate::port::{Origin, SampleReader, ServiceForm};
+use crate::port::{EndpointId, Origin, SampleReader, ServiceForm};
 use crate::sync::lock;
+
+/// Between two looks whether a server knows its client.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// Longest time that a first request waits for its server to know the client: the period of Fast DDS's heartbeats, by which
+/// it repairs discovery.
+const ACQUAINTANCE: Duration = Duration::from_secs(3);
 
 /// Calls that wait for answers.
 #[derive(Default)]
@@ -28,7 +37,7 @@ impl Waiting {
     }
 
     /// Hears answers until the task is dropped.
-    pub(crate) async fn listen(self: Arc<Self>, answers: Box<dyn SampleReader>) {
+    pub(crate) async fn listen(self: Arc<Self>, answers: Arc<dyn SampleReader>) {
         loop {
             // What cannot be had is no answer; its call ends by time.
             if let Ok(origin) = answers.next().await {
@@ -47,6 +56,9 @@ pub(crate) struct Asking {
     pub servers: Arc<Peers>,
     /// The other ends of the answers.
     pub answerers: Arc<Peers>,
+    pub answers: Arc<dyn SampleReader>,
+    /// The one that was waited for last.
+    pub acquainted: Mutex<Option<EndpointId>>,
     pub waiting: Arc<Waiting>,
     pub next: AtomicI64,
 }
@@ -56,7 +68,8 @@ impl Asking {
     pub(crate) async fn call(&self, request: &[u8]) -> Result<Vec<u8>, String> {
         let server = self.servers.known(|_| true).await;
         if self.form == ServiceForm::Topics {
-            self.answerers.known(|_| true).await;
+            let answerer = self.answerers.known(|peer| peer.is_beside(&server)).await;
+            self.until_known_to(&answerer).await;
         }
         let number = self.next.fetch_add(1, Relaxed);
         let asked = write_request(self.form, request, &self.requests.id(), &server, number);
@@ -69,6 +82,19 @@ impl Asking {
             .map_err(|error| error.to_string())?;
         let answer = answer.recv().await;
         answer.map_err(|_| "the client has ended".to_owned())
+    }
+
+    /// Waits until the writer of the answers has matched our reader: a datagram of discovery may be lost on its way there,
+    /// and an answer to nobody is lost for good.
+    async fn until_known_to(&self, answerer: &EndpointId) {
+        if *lock(&self.acquainted) == Some(*answerer) {
+            return;
+        }
+        let begin = Instant::now();
+        while !self.answers.is_known_to(answerer) && begin.elapsed() < ACQUAINTANCE {
+            Timer::after(LOOK).await;
+        }
+        *lock(&self.acquainted) = Some(*answerer);
     }
 }
 

@@ -15,7 +15,7 @@ use crate::error::RuntimeError;
 use crate::graph::{NodeEndpoint, NodeId};
 use crate::outbox::WhenFull;
 use crate::peers::Peers;
-use crate::port::{ClientEnds, EndpointKind, PortService, ServiceQos};
+use crate::port::{ClientEnds, EndpointKind, PortService, SampleReader, ServiceQos};
 use crate::qos::Qos;
 use crate::service::{Asking, LocalCall, Waiting};
 use crate::sync::lock;
@@ -181,6 +181,7 @@ impl Shared {
             answers,
         } = self.transport(name, |transport| transport.client(service, &QOS))?;
         let requests = self.outbox_of(name, requests, WhenFull::Drop)?;
+        let answers: Arc<dyn SampleReader> = Arc::from(answers);
         let (reader, writer) = (EndpointKind::Reader, EndpointKind::Writer);
         let graph = [
             (self.graph).join(client.node, reader, answers.id(), None),
@@ -191,7 +192,7 @@ impl Shared {
         self.endpoints.register(requests.id(), &servers);
         self.endpoints.register(answers.id(), &answerers);
         let waiting = Arc::new(Waiting::default());
-        let listen = Arc::clone(&waiting).listen(answers);
+        let listen = Arc::clone(&waiting).listen(Arc::clone(&answers));
         let task = self.io.spawn(listen).ok_or_else(|| closed(name))?;
         let next = AtomicI64::new(1);
         Ok(Remote {
@@ -200,6 +201,8 @@ impl Shared {
                 requests,
                 servers,
                 answerers,
+                answers,
+                acquainted: Mutex::default(),
                 waiting,
                 next,
             },

@@ -23,9 +23,10 @@ impl Shared {
         node: NodeId,
         topic: &str,
         qos: &Qos,
+        when_full: WhenFull,
     ) -> Result<Publisher<M>, RuntimeError> {
         let of = (M::TYPE, None);
-        let parts = self.publisher_parts(node, topic, of, qos, WhenFull::Drop, |peers| {
+        let parts = self.publisher_parts(node, topic, of, qos, when_full, |peers| {
             let topic = self.bus.topic(topic);
             topic.join_publisher::<M>(peers, qos.kept())
         })?;
