@@ -55,6 +55,40 @@ fn unknown_parameters_are_refused_by_every_command() {
 }
 
 #[test]
+fn values_out_of_range_are_refused_with_their_range() {
+    for (node, wanted, expected) in [
+        (
+            "lattice_mapper",
+            "max_message_bytes:=1",
+            "`max_message_bytes` of /lattice_mapper = 1 (command line): expected a number from 1000 to 4294967295",
+        ),
+        (
+            "enu_transformer",
+            "points_topics:=[]",
+            "`points_topics` of /enu_transformer = [] (command line): expected at least one topic",
+        ),
+        (
+            "bag_player",
+            "duration_s:=-1.0",
+            "`duration_s` of /bag_player = -1.0 (command line): expected a number from 0.0 to 1000000000.0",
+        ),
+        (
+            "map_merger",
+            "robots:=[]",
+            "`robots` of /map_merger = [] (command line): expected names of robots, each once",
+        ),
+        (
+            "lattice_mapper",
+            "max_voxels:=0",
+            "`max_voxels` of /lattice_mapper = 0 (command line): expected 1 or more",
+        ),
+    ] {
+        let line = error(&["node", node, "--ros-args", "-p", wanted]);
+        assert!(line.contains(expected), "{line}");
+    }
+}
+
+#[test]
 fn files_are_checked_by_section() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path().join("robot.yaml");
