@@ -220,7 +220,8 @@ def main():
     with open(directory / "soak.csv", "w") as table:
         print("loop,node,resident_kb,threads,descriptors", file=table)
         while not is_last:
-            is_last = time.monotonic() > end
+            # Quarters of a loop at least.
+            is_last = time.monotonic() > end and loops >= 3
             if clients and not is_last:
                 clients.attack()
             waited = json.dumps(CLOUDS + [INS])

@@ -130,6 +130,7 @@ macro_rules! wait_for_match {
 }
 
 mod delivery;
+mod gaps;
 mod process;
 mod stalled;
 
