@@ -124,7 +124,12 @@ mod tests {
         for item in [topic("/good"), topic("bad name"), message(0, 12)] {
             cache.push(item);
         }
-        for item in [message(1, 12), message(1, 12), message(0, 2), message(0, 12)] {
+        for item in [
+            message(1, 12),
+            message(1, 12),
+            message(0, 2),
+            message(0, 12),
+        ] {
             cache.push(item);
         }
         cache.close();
