@@ -143,7 +143,7 @@ class Topics:
             for topic in topics:
                 writer = participant.writer(f"rt/{topic}", kind, qos(10, topic in LATCHED))
                 self.writers.append((writer, kind))
-        self.maps = self.forger.writer("rt/map", ros.LatticeMap, qos(CHUNKS))
+        self.maps = self.forger.writer("rt/map", ros.LatticeMap, qos(CHUNKS, latched=True))
         self.forger.reader("rt/map", ros.LatticeMap, qos(CHUNKS), self.hear)
         self.clouds = self.forger.writer("rt/headset/points", ros.PointCloud2, qos(10))
 

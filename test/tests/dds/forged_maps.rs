@@ -178,12 +178,17 @@ fn a_forged_keyframe_lasts_until_the_next_update() {
             }
         });
         while asked.try_recv().is_ok() {}
-        // The mapper has mapped one more cloud, and nothing after it.
-        mapper.update(&line(10, -10.0 * number as f32));
-        let voxels = mapper.voxels();
+        // The mapper maps the same again, once a second. Its next update is enough, but where the stamp is of a time to
+        // come: there it takes until no update of before can be on its way.
+        let more = line(10, -10.0 * number as f32);
+        mapper.update(&more);
+        let (voxels, mut last) = (mapper.voxels(), Instant::now());
         each_has(voxels, number, &mut || {
             if asked.try_recv().is_ok() {
                 mapper.keyframe();
+            } else if stamp == future && last.elapsed() > Duration::from_secs(1) {
+                last = Instant::now();
+                mapper.update(&more);
             }
         });
     }
