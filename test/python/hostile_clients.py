@@ -167,11 +167,12 @@ class Topics:
     def forged_maps(self, may):
         """A whole keyframe of other content in the mapper's epoch, under a number that it has not given yet."""
         self.forger.turn()
-        genuine, self.genuine = self.genuine, None
+        genuine = self.genuine
         if genuine is None:
             pause(may, GARBAGE_PERIOD_S)
             return 0
-        ahead, count = random.choice([1, 3, 1 << 40]), CHUNK_VOXELS
+        # Updates do not come to it while its chunks are sent.
+        ahead, count = random.choice([100, 1 << 40]), CHUNK_VOXELS
         # Of the mapper's last point, and of a time to come.
         stamp = random.choice([genuine.header.stamp, ros.Time(2**31 - 1, 0)])
         labelled = len(genuine.labels) > 0
@@ -198,7 +199,6 @@ class Topics:
                     history_checksum=random.getrandbits(64),
                 )
             )
-            pause(may, 0.01)
         pause(may, PAUSE_S)
         return 1
 
