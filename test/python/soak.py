@@ -28,11 +28,11 @@ PARAMS = Path(__file__).parents[2] / "params/bobcat.yaml"
 LOG_S = 20
 CLOUDS = [f"/{place}/points" for place in ("left", "right", "top")]
 INS = "/novatel/oem7/inspvax"
-# Topics on which nothing may be lost, with their depths: the last clouds wait for the last pose.
-RELIABLE = {topic: 64 for topic in CLOUDS} | {INS: 200}
+# Topics on which nothing may be lost, with depths that hold a whole log, however long a node is kept from the processor.
+RELIABLE = {topic: 2000 for topic in CLOUDS} | {INS: 2500}
 NODES = {
-    "enu_transformer": RELIABLE | {"/points_enu": 512},
-    "lattice_mapper": {"/points_enu": 512},
+    "enu_transformer": RELIABLE | {"/points_enu": 6000},
+    "lattice_mapper": {"/points_enu": 6000},
     "voxel_marker_publisher": {},
     "bag_player": RELIABLE,
     "semantic_icp_server": {},

@@ -139,8 +139,8 @@ fn updates_that_find_the_publisher_full_are_counted_each() {
                 .find(|of| of.name == "lattice_mapper: map");
             let value = |key: &str| {
                 let values = mapper.into_iter().flat_map(|of| &of.values);
-                let found = values.filter(|value| value.key == key).next_back();
-                found.map_or(0, |value| value.value.parse().unwrap())
+                let mut found = values.filter(|value| value.key == key);
+                found.next().map_or(0, |value| value.value.parse().unwrap())
             };
             dropped = value("updates_not_published");
             let came = heard.received() + heard.lost();

@@ -261,12 +261,11 @@ fn messages_that_find_an_inbox_full_are_counted_each() {
         node.map("map", &vec![chunks[0].clone(); 200]);
         sent += 200;
         // The numbers of a moment when nothing is on the way.
-        let status = loop {
+        refused = loop {
             let status = node.stated.recv_timeout(PATIENCE).unwrap();
             if status.name.ends_with("markers") {
                 let value = |key: &str| {
-                    let values = status.values.iter();
-                    let found = values.filter(|value| value.key == key).next_back();
+                    let found = status.values.iter().find(|value| value.key == key);
                     found.unwrap().value.parse::<u64>().unwrap()
                 };
                 let (taken, full) = (value("messages_in"), value("inbox_full"));
@@ -276,7 +275,6 @@ fn messages_that_find_an_inbox_full_are_counted_each() {
                 }
             }
         };
-        refused = status;
     }
     node.ends_with(&[("messages_in", sent - refused), ("inbox_full", refused)]);
 }
