@@ -217,6 +217,8 @@ def main():
     lattice, directory, minutes = sys.argv[1], Path(sys.argv[2]), float(sys.argv[3])
     hostile = sys.argv[4:] == ["--hostile"]
     assert hostile or len(sys.argv) == 4, __doc__
+    # The nodes end with it.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     directory.mkdir(parents=True, exist_ok=True)
     log, wanted = prepare(lattice, directory)
     clouds, first = wanted["counts"]["clouds_in"], None
