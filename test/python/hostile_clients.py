@@ -175,7 +175,7 @@ class Topics:
         ahead, count = random.choice([100, 1 << 40]), CHUNK_VOXELS
         # Of the mapper's last point, and of a time to come.
         stamp = random.choice([genuine.header.stamp, ros.Time(2**31 - 1, 0)])
-        labelled = len(genuine.labels) > 0
+        labelled, history = len(genuine.labels) > 0, random.getrandbits(64)
         for chunk in range(CHUNKS):
             # Keys from the middle of the lattice on.
             first = (7 << 60) + chunk * count
@@ -196,7 +196,7 @@ class Topics:
                     mean_offsets=[0] * (3 * count),
                     labels=[0] * (count * labelled),
                     label_counts=[1] * (count * labelled),
-                    history_checksum=random.getrandbits(64),
+                    history_checksum=history,
                 )
             )
         pause(may, PAUSE_S)
