@@ -1,17 +1,20 @@
 """The nodes in processes of their own, for hours: one log again and again, a new player each time.
 
-    soak.py LATTICE DIRECTORY MINUTES     ROS_DOMAIN_ID as the nodes take it
+    soak.py LATTICE DIRECTORY MINUTES [--hostile]     ROS_DOMAIN_ID as the nodes take it
 
 After each loop every cloud must have been counted, and the map must be that of the loop before, at last
 that of `lattice replay --direct`; then the mapper is reset. Memory, descriptors and threads of each process are written to
-DIRECTORY/soak.csv and must be flat from the second quarter to the last one, but for what the transport is
-known to keep of each player.
+DIRECTORY/soak.csv and must be flat from the second quarter to the last one.
+
+With `--hostile` there are more nodes, and the clients of hostile_clients.py attack them in every loop but the last, after
+which the maps of all nodes must be the mapper's again. The sizes are those when the clients rest.
 """
 
 import atexit
 import json
 import os
 import signal
+import socket
 import statistics
 import subprocess
 import sys
@@ -25,14 +28,35 @@ PARAMS = Path(__file__).parents[2] / "params/bobcat.yaml"
 LOG_S = 20
 CLOUDS = [f"/{place}/points" for place in ("left", "right", "top")]
 INS = "/novatel/oem7/inspvax"
-# Topics on which nothing may be lost, with their depths: the last clouds wait for the last pose.
-RELIABLE = {topic: 64 for topic in CLOUDS} | {INS: 200}
+# Topics on which nothing may be lost, with depths that hold a whole log, however long a node is kept from the processor.
+RELIABLE = {topic: 2000 for topic in CLOUDS} | {INS: 2500}
 NODES = {
-    "enu_transformer": RELIABLE | {"/points_enu": 512},
-    "lattice_mapper": {"/points_enu": 512},
+    "enu_transformer": RELIABLE | {"/points_enu": 6000},
+    "lattice_mapper": {"/points_enu": 6000},
     "voxel_marker_publisher": {},
     "bag_player": RELIABLE,
+    "semantic_icp_server": {},
+    "viewer_server": {},
 }
+# Nodes of every soak but for the player, and those that are attacked too.
+STEADY = ["enu_transformer", "lattice_mapper", "voxel_marker_publisher"]
+ATTACKED = ["semantic_icp_server", "viewer_server"]
+# Where followers of the map show how much of it they have.
+FOLLOWED = {
+    "voxel_marker_publisher": ("markers", "voxels"),
+    "semantic_icp_server": ("calibration", "map_voxels"),
+    "viewer_server": ("viewer", "voxels"),
+}
+# What shows that attacks came through, by task.
+FELT = {
+    "voxel_marker_publisher: markers": ["map_differences", "undecodable"],
+    "semantic_icp_server: calibration": ["map_differences", "undecodable", "clouds_too_large"],
+    "viewer_server: viewer": ["clients_stalled", "connections_displaced"],
+    "lattice_mapper: map": ["undecodable"],
+    "enu_transformer: clouds": ["undecodable"],
+}
+# A player of the same log on topics of its own.
+HELD = "held_player"
 # Growth of the resident memory that is no leak: pages that an allocator keeps, and buffers.
 FLAT = 1.05
 SLACK_KB = 2048
@@ -46,15 +70,19 @@ SaveMapResponse = ros.ros(
 class Node:
     """A node in a process of its own."""
 
-    def __init__(self, lattice, name, directory, **params):
+    def __init__(self, lattice, name, directory, program=None, remaps={}, **params):
         self.name, self.report = name, directory / f"{name}.json"
         self.log = open(directory / f"{name}.log", "a")
+        program = program or name
         options = {"report_file": self.report} | params
-        for topic, depth in NODES[name].items():
+        for topic, depth in NODES[program].items():
             options |= {f"qos.{topic}.reliability": "reliable", f"qos.{topic}.depth": depth}
-        arguments = [lattice, "node", name, "--ros-args", "--params-file", PARAMS]
+        arguments = [lattice, "node", program, "--ros-args", "--params-file", PARAMS]
+        arguments += ["-r", f"__node:={name}"]
         for option in options.items():
             arguments += ["-p", "{}:={}".format(*option)]
+        for remap in remaps.items():
+            arguments += ["-r", "{}:={}".format(*remap)]
         # The configuration of the observer's Cyclone is none of theirs.
         environment = {key: os.environ[key] for key in os.environ if key != "CYCLONEDDS_URI"}
         self.process = subprocess.Popen(arguments, stderr=self.log, env=environment)
@@ -106,6 +134,15 @@ class Observer:
         """Clouds that the mapper has counted."""
         return int(self.values.get("lattice_mapper: map", {}).get("clouds_in", 0))
 
+    def followed(self, nodes):
+        """Voxels of the mapper's map, and of those that the other nodes have of it."""
+
+        def shown(node, task, key):
+            return self.values.get(f"{node}: {task}", {}).get(key)
+
+        followers = {node: shown(node, *FOLLOWED[node]) for node in nodes if node in FOLLOWED}
+        return {"lattice_mapper": shown("lattice_mapper", "map", "voxels")} | followers
+
     def ask(self, writer, request, argument):
         self.number += 1
         number = self.number
@@ -113,6 +150,32 @@ class Observer:
         self.peer.until(lambda: number in self.replies, lambda: "no reply")
         reply = self.replies.pop(number)
         assert reply.success, reply.message
+
+
+class Hostile:
+    """The hostile clients, in a process of their own."""
+
+    def __init__(self, port):
+        program = Path(__file__).with_name("hostile_clients.py")
+        arguments = [sys.executable, program, os.environ["ROS_DOMAIN_ID"], str(port), HELD]
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+        self.process = subprocess.Popen(arguments, **pipes)
+        atexit.register(self.process.kill)
+
+    def attack(self):
+        print("attack", file=self.process.stdin, flush=True)
+
+    def rest(self):
+        """How often each client has done its work."""
+        print("rest", file=self.process.stdin, flush=True)
+        line = self.process.stdout.readline()
+        assert line, "the hostile clients have ended"
+        return json.loads(line)
+
+
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return server.getsockname()[1]
 
 
 def prepare(lattice, directory):
@@ -131,26 +194,46 @@ def grown(sizes):
     # The middle: a map that is being saved has a thread.
     middle = lambda part: [statistics.median(column) for column in zip(*part)]
     then, last = (middle(sizes[n * quarter :][:quarter]) for n in (1, 3))
-    memory = last[0] > FLAT * then[0] + SLACK_KB + 2 * quarter * PER_PLAYER_KB
+    memory = last[0] > FLAT * then[0] + SLACK_KB
     return f"{then} -> {last}" if memory or last[1:] > then[1:] else ""
+
+
+def start(lattice, directory, log, hostile):
+    """The nodes but for the player, and the port of the viewer."""
+    port, options = free_port(), {"lattice_mapper": {"map_dir": directory.absolute()}}
+    options["viewer_server"] = {"port": port}
+    names = STEADY + (ATTACKED if hostile else [])
+    nodes = [Node(lattice, name, directory, **options.get(name, {})) for name in names]
+    if hostile:
+        topics = CLOUDS + [INS]
+        held = {"bag": log, "start_paused": True, "loop": True, "keyboard": False}
+        held |= {"program": "bag_player", "topics": json.dumps(topics)}
+        remaps = {topic: f"/held{topic}" for topic in topics}
+        nodes.append(Node(lattice, HELD, directory, remaps=remaps, **held))
+    return nodes, port
 
 
 def main():
     lattice, directory, minutes = sys.argv[1], Path(sys.argv[2]), float(sys.argv[3])
+    hostile = sys.argv[4:] == ["--hostile"]
+    assert hostile or len(sys.argv) == 4, __doc__
+    # The nodes end with it.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     directory.mkdir(parents=True, exist_ok=True)
     log, wanted = prepare(lattice, directory)
     clouds, first = wanted["counts"]["clouds_in"], None
-    options = {"lattice_mapper": {"map_dir": directory.absolute()}}
-    nodes = [
-        Node(lattice, name, directory, **options.get(name, {}))
-        for name in NODES
-        if name != "bag_player"
-    ]
+    nodes, port = start(lattice, directory, log, hostile)
     observer, saved = Observer(), directory / "saved.lattice"
+    clients, attacks = Hostile(port) if hostile else None, {}
     sizes, end, loops = {node.name: [] for node in nodes}, time.monotonic() + 60 * minutes, 0
+    is_last = False
     with open(directory / "soak.csv", "w") as table:
         print("loop,node,resident_kb,threads,descriptors", file=table)
-        while True:
+        while not is_last:
+            # Quarters of a loop at least.
+            is_last = time.monotonic() > end and loops >= 3
+            if clients and not is_last:
+                clients.attack()
             waited = json.dumps(CLOUDS + [INS])
             player = Node(lattice, "bag_player", directory, bag=log, wait_for_subscribers=waited)
             played = player.ended()
@@ -160,15 +243,26 @@ def main():
                 lambda: observer.clouds() >= loops * clouds,
                 lambda: f"loop {loops}: {loops * clouds} clouds went in, {observer.values}",
             )
+            if clients and not is_last:
+                attacks = clients.rest()
             observer.save(saved.name)
             first = first or saved.read_bytes()
             assert saved.read_bytes() == first, f"loop {loops} made another map: {saved}"
             for node in nodes:
                 sizes[node.name].append(node.sizes())
                 print(loops, node.name, *sizes[node.name][-1], sep=",", file=table, flush=True)
-            if time.monotonic() > end:
-                break
-            observer.reset(0)
+            if not is_last:
+                observer.reset(0)
+    names = list(sizes)
+    observer.peer.until(
+        lambda: len(set(observer.followed(names).values())) == 1,
+        lambda: f"the maps differ: {observer.followed(names)}",
+    )
+    if hostile:
+        assert all(attacks.values()), f"clients that did nothing: {attacks}"
+        for task, keys in FELT.items():
+            felt = {key: observer.values[task][key] for key in keys}
+            assert all(int(count) for count in felt.values()), f"{task} was not attacked: {felt}"
     reports = {node.name: node.ended(signal.SIGINT) for node in nodes}
     report = reports["lattice_mapper"]
     assert report["counts"]["clouds_in"] == loops * clouds, report
@@ -177,7 +271,8 @@ def main():
     ], f"{report} is not the map of the log, {wanted}"
     leaks = {name: grown(of) for name, of in sizes.items() if grown(of)}
     ends = {name: {"second loop": of[1], "last": of[-1]} for name, of in sizes.items()}
-    print(json.dumps({"loops": loops, "clouds": loops * clouds, "sizes": ends, "grown": leaks}))
+    result = {"loops": loops, "clouds": loops * clouds, "sizes": ends, "grown": leaks}
+    print(json.dumps(result | ({"attacks": attacks} if hostile else {})))
     sys.exit(1 if leaks else 0)
 
 

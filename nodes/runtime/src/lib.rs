@@ -13,6 +13,7 @@ mod diagnostics;
 mod endpoints;
 pub mod env;
 mod error;
+mod gaps;
 mod gate;
 mod graph;
 pub mod lifecycle;

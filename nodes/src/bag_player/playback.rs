@@ -140,14 +140,20 @@ impl Playback {
         Ok(true)
     }
 
-    /// Holds the log, or goes on with it.
+    /// Holds the log, or goes on with it, which ends a call that plays messages of a held one.
     pub(super) fn hold(&mut self, held: bool) {
         if self.head.is_held() == held {
             return;
         }
         match held {
             true => self.head.hold(),
-            false => self.head.go_on(),
+            false => {
+                self.head.go_on();
+                // Now: the log may be held again before the next message.
+                if let Some(steps) = self.steps.take() {
+                    steps.end();
+                }
+            }
         }
         log::info!("{}", if held { "paused" } else { "goes on" });
     }
@@ -219,11 +225,8 @@ impl Playback {
         }
     }
 
-    /// Plays the next message at once, if the log is still held.
+    /// Plays the next message at once.
     fn take_step(&mut self, steps: Steps) {
-        if !self.head.is_held() {
-            return steps.end();
-        }
         match self.player.skip_to_next(self.head.now_ns()) {
             Ok(Some((topic, data))) => {
                 self.steps = steps.played();

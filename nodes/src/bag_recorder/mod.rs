@@ -21,6 +21,7 @@ use crate::start::{NodeError, check_topics, open_params};
 use cache::Cache;
 use definitions::Definitions;
 use lattice_bag::{BagWriter, Storage, WriterOptions};
+use lattice_runtime::lock;
 use lattice_runtime::ros_args::RosArgs;
 use session::Session;
 use writing::Written;
@@ -71,7 +72,7 @@ pub struct RecordedTopic {
     pub heard: u64,
     /// Messages that were sent and did not get here, or were too long.
     pub lost: u64,
-    /// Messages that found no room in the cache.
+    /// Messages that found no room in the cache, or that no bag can hold.
     pub not_written: u64,
 }
 
@@ -129,11 +130,16 @@ pub fn run(options: RecorderOptions, args: RosArgs) -> Result<RecorderReport, No
     let ended = writer.join();
     drop((servers, session));
     ended.map_err(|_| "the thread that writes the bag has failed")??;
+    let refused = lock(&written.refused);
+    let topics = topics.into_iter().map(|(place, mut topic)| {
+        topic.not_written += refused.get(&place).copied().unwrap_or(0);
+        topic
+    });
     Ok(RecorderReport {
         messages: written.messages.load(Relaxed),
         bytes: written.bytes.load(Relaxed),
         seconds: begin.elapsed().as_secs_f64(),
-        topics,
+        topics: topics.collect(),
     })
 }
 

@@ -174,16 +174,17 @@ impl Session {
         Ok(())
     }
 
-    /// Numbers of each topic.
-    pub(super) fn report(&self) -> Vec<RecordedTopic> {
-        let topic = |topic: &Heard| RecordedTopic {
+    /// Numbers of each topic, with its place.
+    pub(super) fn report(&self) -> Vec<(usize, RecordedTopic)> {
+        let numbers = |topic: &Heard| RecordedTopic {
             name: topic.subscription.topic().to_owned(),
             type_name: topic.ros_type.clone(),
             heard: topic.subscription.received(),
             lost: (topic.subscription.lost()).saturating_add(topic.subscription.undecodable()),
             not_written: self.cache.lost(topic.place),
         };
-        self.topics.iter().map(topic).collect()
+        let topics = self.topics.iter();
+        topics.map(|topic| (topic.place, numbers(topic))).collect()
     }
 
     /// Messages that did not get here or found no room.

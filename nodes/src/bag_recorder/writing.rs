@@ -1,12 +1,13 @@
 //! The thread that writes the bag.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use lattice_bag::{BagError, BagWriter};
-use lattice_runtime::Shutdown;
+use lattice_runtime::{Shutdown, lock};
 
 use super::cache::{Cache, Item, Next};
 
@@ -18,6 +19,14 @@ const FLUSH_PERIOD: Duration = Duration::from_secs(1);
 pub(super) struct Written {
     pub messages: AtomicU64,
     pub bytes: AtomicU64,
+    /// Messages of each topic that no bag can hold.
+    pub refused: Mutex<BTreeMap<usize, u64>>,
+}
+
+impl Written {
+    fn refuse(&self, topic: usize) {
+        *lock(&self.refused).entry(topic).or_default() += 1;
+    }
 }
 
 /// Writes all that comes until the cache is closed. An error ends the recording.
@@ -56,12 +65,16 @@ fn write(mut bag: BagWriter, cache: &Cache, written: &Written) -> Result<(), Bag
                 log_time_ns,
                 data,
             }) => {
-                let Some(topic) = places.get(topic).copied().flatten() else {
+                let Some(place) = places.get(topic).copied().flatten() else {
+                    written.refuse(topic);
                     continue;
                 };
-                match bag.write(topic, log_time_ns, &data) {
+                match bag.write(place, log_time_ns, &data) {
                     // No CDR, which nobody could read.
-                    Err(error @ BagError::Invalid { .. }) => log::warn!("left out: {error}"),
+                    Err(error @ BagError::Invalid { .. }) => {
+                        log::warn!("left out: {error}");
+                        written.refuse(topic);
+                    }
                     wrote => {
                         wrote?;
                         written.messages.fetch_add(1, Relaxed);
@@ -78,5 +91,51 @@ fn write(mut bag: BagWriter, cache: &Cache, written: &Written) -> Result<(), Bag
             bag.flush()?;
             (flushed, is_dirty) = (Instant::now(), false);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lattice_bag::{Storage, TopicSpec, WriterOptions};
+
+    use super::*;
+
+    #[test]
+    fn messages_that_no_bag_can_hold_are_not_written_and_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = WriterOptions::default();
+        let bag = BagWriter::create(&folder.path().join("bag"), Storage::Mcap, options).unwrap();
+        let (cache, written) = (Arc::new(Cache::new(1000)), Arc::new(Written::default()));
+        let topic = |name: &str| {
+            Item::Topic(TopicSpec {
+                name: name.to_owned(),
+                type_name: "std_msgs/msg/Empty".to_owned(),
+                type_hash: String::new(),
+                definition: None,
+                offered_qos: Vec::new(),
+            })
+        };
+        let message = |topic, bytes: usize| Item::Message {
+            topic,
+            log_time_ns: 7,
+            data: [&[0, 1, 0, 0][..], &[0; 8]].concat()[..bytes].to_vec(),
+        };
+        // A name that no topic has; then a sound topic with a message that is no CDR.
+        for item in [topic("/good"), topic("bad name"), message(0, 12)] {
+            cache.push(item);
+        }
+        for item in [
+            message(1, 12),
+            message(1, 12),
+            message(0, 2),
+            message(0, 12),
+        ] {
+            cache.push(item);
+        }
+        cache.close();
+        let thread = spawn(bag, cache, Arc::clone(&written), Shutdown::default()).unwrap();
+        thread.join().unwrap().unwrap();
+        assert_eq!(*lock(&written.refused), BTreeMap::from([(0, 1), (1, 2)]));
+        assert_eq!(written.messages.load(Relaxed), 2);
     }
 }

@@ -6,10 +6,33 @@ use std::sync::Arc;
 use lattice_msgs::headset::HeadsetMesh;
 
 use super::refusal::{MeshRefusal, shown};
+use super::session::MAX_DELAY_NS;
+
+/// Times of a state of a surface, ns.
+#[derive(Clone, Copy)]
+pub(super) struct StateTime {
+    /// By the clock of the headset.
+    pub stamp_ns: i64,
+    /// By the clock of the node.
+    pub arrival_ns: i64,
+}
+
+impl StateTime {
+    /// True if this state was overtaken by the one that is known. One that would have been on its way for longer than
+    /// messages are has the stamp of a clock that was set back.
+    pub(super) fn is_late(self, known: Self) -> bool {
+        let older_ns = known.stamp_ns.saturating_sub(self.stamp_ns);
+        let later_ns = self.arrival_ns.saturating_sub(known.arrival_ns);
+        older_ns > 0 && older_ns.saturating_add(later_ns) <= MAX_DELAY_NS
+    }
+}
 
 /// Chunks of a state of a surface.
 struct Pending {
-    stamp_ns: i64,
+    /// Of the first chunk.
+    time: StateTime,
+    /// Surfaces that had begun before.
+    number: u64,
     chunks: BTreeMap<u32, Arc<HeadsetMesh>>,
 }
 
@@ -18,16 +41,7 @@ struct Pending {
 pub(super) struct Chunks {
     pending: BTreeMap<String, Pending>,
     numbers: usize,
-}
-
-/// Longest that messages overtake each other. A state that seems to be older yet comes of a clock that was set, or
-/// the one before had a stamp of the future.
-const OVERTAKEN_NS: i64 = 60_000_000_000;
-
-/// True if a state was overtaken by the one that is known.
-pub(super) fn is_late(stamp_ns: i64, known_ns: i64) -> bool {
-    let late_ns = known_ns.saturating_sub(stamp_ns);
-    (1..=OVERTAKEN_NS).contains(&late_ns)
+    begun: u64,
 }
 
 /// Numbers in the arrays of a chunk, and one for the chunk itself.
@@ -40,20 +54,25 @@ impl Chunks {
     pub fn push(
         &mut self,
         chunk: Arc<HeadsetMesh>,
+        time: StateTime,
     ) -> Result<Option<Vec<Arc<HeadsetMesh>>>, MeshRefusal> {
-        let stamp_ns = chunk.header.stamp.to_ns();
-        let known = self.pending.get(&chunk.surface).map(|state| state.stamp_ns);
+        let known = self.pending.get(&chunk.surface).map(|state| state.time);
         let surface = || shown(&chunk.surface);
-        if known.is_some_and(|known_ns| is_late(stamp_ns, known_ns)) {
+        if known.is_some_and(|known| time.is_late(known)) {
             return Err(MeshRefusal::Stale { surface: surface() });
         }
-        if known.is_some_and(|known_ns| stamp_ns != known_ns) {
+        if known.is_some_and(|known| time.stamp_ns != known.stamp_ns) {
             self.remove(&chunk.surface);
         }
         let of = self.pending.entry(chunk.surface.clone());
-        let pending = of.or_insert_with(|| Pending {
-            stamp_ns,
-            chunks: BTreeMap::new(),
+        let begun = &mut self.begun;
+        let pending = of.or_insert_with(|| {
+            *begun += 1;
+            Pending {
+                time,
+                number: *begun,
+                chunks: BTreeMap::new(),
+            }
         });
         if let Some(first) = pending.chunks.values().next()
             && (first.chunks != chunk.chunks || first.pose != chunk.pose)
@@ -74,11 +93,11 @@ impl Chunks {
         Ok(all.map(|chunks| chunks.into_values().collect()))
     }
 
-    /// Forgets the surfaces that wait longest until these bounds hold; gives how many.
+    /// Forgets the surfaces that have waited longest until these bounds hold; gives how many.
     pub fn bound(&mut self, max_surfaces: usize, max_numbers: usize) -> u64 {
         let mut gone = 0;
         while self.pending.len() > max_surfaces || self.numbers > max_numbers {
-            let oldest = self.pending.iter().min_by_key(|(_, state)| state.stamp_ns);
+            let oldest = self.pending.iter().min_by_key(|(_, state)| state.number);
             let Some(oldest) = oldest.map(|(surface, _)| surface.clone()) else {
                 break;
             };

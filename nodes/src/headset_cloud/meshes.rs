@@ -81,7 +81,7 @@ impl HeadsetCloud {
         if told != Told::Same {
             outputs.push(HeadsetOutput::Session(message.session.clone()));
         }
-        self.surfaces.on_mesh(message)
+        self.surfaces.on_mesh(message, self.now_ns)
     }
 
     /// Forgets what was known in the origin before.

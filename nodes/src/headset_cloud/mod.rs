@@ -158,7 +158,7 @@ impl HeadsetCloud {
         self.serve()
     }
 
-    /// Counts images that left for others: one of the same stamp, and the oldest.
+    /// Counts images that left for others: one of the same stamp, and those that came first.
     fn left(&mut self, stream: HeadsetStream, [repeated, oldest]: [u64; 2]) {
         let reason = self.missing(stream);
         self.counts.drop_some(stream.name(), "repeated", repeated);

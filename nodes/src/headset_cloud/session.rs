@@ -18,9 +18,10 @@ pub(super) enum Told {
     Ended,
 }
 
+/// Longest delay of a message on its way from a headset.
+pub(super) const MAX_DELAY_NS: i64 = 10_000_000_000;
 /// Silence after which a session that had ended may go on, as of an application that was in the background.
-/// Messages delayed by the network arrive within it.
-const SILENT_NS: i64 = 10_000_000_000;
+const SILENT_NS: i64 = MAX_DELAY_NS;
 /// Ended sessions that are known.
 const MAX_ENDED: usize = 16;
 

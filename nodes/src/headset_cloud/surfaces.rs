@@ -8,7 +8,7 @@ use lattice_core::registration::UNLABELED;
 use lattice_msgs::headset::HeadsetMesh;
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::chunks::{Chunks, is_late};
+use super::chunks::{Chunks, StateTime};
 use super::refusal::{MeshRefusal, shown};
 use crate::convert::geometry::isometry_from_pose;
 use crate::mesh::{LabelledMesh, MeshError};
@@ -34,7 +34,7 @@ pub struct MeshOptions {
 /// A surface, its vertices in the headset's origin and the axes of ROS, seen from where its corners go
 /// counterclockwise.
 struct Surface {
-    stamp_ns: i64,
+    time: StateTime,
     mesh: LabelledMesh,
 }
 
@@ -73,10 +73,17 @@ impl Surfaces {
     }
 
     /// Takes a surface, a chunk of it, or word that it is gone, which were checked.
-    pub fn on_mesh(&mut self, message: &Arc<HeadsetMesh>) -> Result<Change, MeshRefusal> {
-        let stamp_ns = message.header.stamp.to_ns();
+    pub fn on_mesh(
+        &mut self,
+        message: &Arc<HeadsetMesh>,
+        arrival_ns: i64,
+    ) -> Result<Change, MeshRefusal> {
+        let time = StateTime {
+            stamp_ns: message.header.stamp.to_ns(),
+            arrival_ns,
+        };
         let there = self.surfaces.get(&message.surface);
-        if there.is_some_and(|there| is_late(stamp_ns, there.stamp_ns)) {
+        if there.is_some_and(|there| time.is_late(there.time)) {
             let surface = shown(&message.surface);
             return Err(MeshRefusal::Stale { surface });
         }
@@ -86,11 +93,11 @@ impl Surfaces {
             change.removed = u64::from(self.surfaces.remove(&message.surface).is_some());
             return Ok(change);
         }
-        if let Some(chunks) = self.chunks.push(Arc::clone(message))? {
+        if let Some(chunks) = self.chunks.push(Arc::clone(message), time)? {
             let (mesh, degenerate) = self.joined(&chunks)?;
             change.degenerate = degenerate;
             change.replaced = 1;
-            self.insert(&message.surface, stamp_ns, mesh)?;
+            self.insert(&message.surface, time, mesh)?;
         }
         let max_numbers = self.options.max_triangles.saturating_mul(7);
         change.incomplete = self.chunks.bound(self.options.max_surfaces, max_numbers);
@@ -110,7 +117,11 @@ impl Surfaces {
                 surface: surface(),
                 error,
             })?;
-        self.insert(name, 0, mesh)?;
+        let time = StateTime {
+            stamp_ns: 0,
+            arrival_ns: 0,
+        };
+        self.insert(name, time, mesh)?;
         Ok(Change {
             replaced: 1,
             degenerate,
@@ -264,7 +275,12 @@ impl Surfaces {
     }
 
     /// Puts a surface in the place of the one of its name, if it is not too large.
-    fn insert(&mut self, name: &str, stamp_ns: i64, mesh: LabelledMesh) -> Result<(), MeshRefusal> {
+    fn insert(
+        &mut self,
+        name: &str,
+        time: StateTime,
+        mesh: LabelledMesh,
+    ) -> Result<(), MeshRefusal> {
         let others = || self.surfaces.iter().filter(|(other, _)| *other != name);
         let surface = || shown(name);
         if others().count() >= self.options.max_surfaces {
@@ -283,7 +299,7 @@ impl Surfaces {
         if mesh.is_empty() {
             self.surfaces.remove(name);
         } else {
-            let surface = Surface { stamp_ns, mesh };
+            let surface = Surface { time, mesh };
             self.surfaces.insert(name.to_owned(), surface);
         }
         Ok(())

@@ -29,11 +29,19 @@ impl HeadsetStream {
 /// Images of each topic by stamp, in bounded number.
 #[derive(Default)]
 pub(super) struct Waiting {
-    queues: [BTreeMap<i64, LabelSet>; 2],
+    queues: [BTreeMap<i64, Arrived>; 2],
+    arrivals: u64,
+}
+
+/// An image, and how many had come with it.
+struct Arrived {
+    number: u64,
+    set: LabelSet,
 }
 
 impl Waiting {
-    /// Adds an image; gives how many of its topic leave for it: one of its stamp, and the oldest.
+    /// Adds an image; gives how many of its topic leave for it: one of its stamp, and those that came first. Their
+    /// stamps may be those of a clock that was ahead.
     pub fn push(
         &mut self,
         stream: HeadsetStream,
@@ -50,14 +58,20 @@ impl Waiting {
 
     fn push_set(&mut self, stream: HeadsetStream, set: LabelSet, queue_size: usize) -> [u64; 2] {
         let stamp_ns = set.labels.header.stamp.to_ns();
+        self.arrivals += 1;
+        let number = self.arrivals;
         let queue = &mut self.queues[stream as usize];
-        let repeated = queue.insert(stamp_ns, set).is_some();
-        let mut oldest = 0;
+        let repeated = queue.insert(stamp_ns, Arrived { number, set }).is_some();
+        let mut gone = 0;
         while queue.len() > queue_size.max(1) {
-            queue.pop_first();
-            oldest += 1;
+            let first = queue.iter().min_by_key(|(_, image)| image.number);
+            let Some(first_ns) = first.map(|(stamp_ns, _)| *stamp_ns) else {
+                break;
+            };
+            queue.remove(&first_ns);
+            gone += 1;
         }
-        [u64::from(repeated), oldest]
+        [u64::from(repeated), gone]
     }
 
     /// Stamps of labels for which nothing but a pose may be missing, and the frames of their cameras.
@@ -65,16 +79,16 @@ impl Waiting {
         let [labels, confidences] = &self.queues;
         let is_whole = |stamp_ns: &i64| !with_confidence || confidences.contains_key(stamp_ns);
         let ready = labels.iter().filter(|(stamp_ns, _)| is_whole(stamp_ns));
-        let frame = |set: &LabelSet| set.labels.header.frame_id.clone();
-        ready.map(|(at, set)| (*at, frame(set))).collect()
+        let frame = |image: &Arrived| image.set.labels.header.frame_id.clone();
+        ready.map(|(at, image)| (*at, frame(image))).collect()
     }
 
     /// Takes the images of a stamp.
     pub fn take(&mut self, stamp_ns: i64) -> Option<LabelSet> {
         let [labels, confidences] = &mut self.queues;
-        let mut set = labels.remove(&stamp_ns)?;
+        let mut set = labels.remove(&stamp_ns)?.set;
         if let Some(confidence) = confidences.remove(&stamp_ns) {
-            set.confidence = Some(confidence.labels);
+            set.confidence = Some(confidence.set.labels);
         }
         Some(set)
     }

@@ -354,12 +354,14 @@ impl Shell {
         self.centers();
         // What is not sent by then counts.
         self.output.flush();
+        let (clouds, voxels) = (self.machine.counts().clouds_in, self.machine.cells().len());
+        let points = self.machine.distortion().points;
+        log::info!("{clouds} clouds, {points} points in {voxels} voxels");
+        // The report counts the bytes of a keyframe, which a map of millions of voxels takes seconds for.
+        if self.report_file.is_empty() {
+            return;
+        }
         let report = self.report();
-        let (clouds, voxels) = (report.counts.clouds_in, report.voxels);
-        log::info!(
-            "{clouds} clouds, {} points in {voxels} voxels",
-            report.points
-        );
         if let Err(error) = report::write(&self.report_file, &report, &self.diagnostics) {
             log::error!("{error}");
         }

@@ -24,6 +24,8 @@ const MAX_STAGING_UPDATES: u64 = 10;
 /// Updates in a row that are older than the map before it is taken for another's: more than wait while a
 /// keyframe is worked on.
 const MAX_OLD_UPDATES: u32 = 128;
+/// Seconds that an update is on its way at most when a later one or a keyframe has overtaken it.
+const MAX_OVERTAKEN_S: u32 = 5;
 /// Quiet seconds after which the rest of a keyframe is taken for lost, at first and at most: a
 /// mapper with a long update period must not be asked again and again.
 const PATIENCE_S: [u32; 2] = [2, 64];
@@ -45,6 +47,8 @@ pub struct MapFollower {
     old_updates: u32,
     /// Stamp of the keyframe that the map is at, until an update follows it.
     keyframe_ns: Option<i64>,
+    /// Seconds since the sequence has changed.
+    still_s: u32,
     /// Newest sequence of any message of the epoch.
     newest: u64,
     staging: Option<Staging>,
@@ -72,6 +76,7 @@ impl MapFollower {
             differences: 0,
             old_updates: 0,
             keyframe_ns: None,
+            still_s: 0,
             newest: 0,
             staging: None,
             open_updates: BTreeMap::new(),
@@ -198,6 +203,7 @@ impl MapFollower {
             // So is a later one than the keyframe that it is said to precede.
             let stamp_ns = message.header.stamp.to_ns();
             let is_other = message.sequence == at && history != self.history
+                || self.still_s > MAX_OVERTAKEN_S
                 || self.keyframe_ns.is_some_and(|at_ns| stamp_ns > at_ns);
             return Ok(match is_other || self.old_updates > MAX_OLD_UPDATES {
                 true => self.differ("an update of another history"),
@@ -262,6 +268,7 @@ impl MapFollower {
     /// Waits one second more for what is incomplete; true if a keyframe is to be asked for, since
     /// nothing more has come of it. To be called once a second.
     pub fn wait_a_second(&mut self) -> bool {
+        self.still_s = self.still_s.saturating_add(1);
         let incomplete = self.staging.is_some() || !self.open_updates.is_empty();
         if !incomplete && !self.keyframe_needed {
             return false;
@@ -284,10 +291,8 @@ impl MapFollower {
     fn differ(&mut self, why: &str) -> Followed {
         self.differences += 1;
         log::warn!("the map differs from its mapper's ({why}): it is asked for again");
-        self.sequence = None;
-        self.keyframe_ns = None;
-        self.newest = 0;
-        self.old_updates = 0;
+        (self.sequence, self.keyframe_ns) = (None, None);
+        (self.newest, self.old_updates) = (0, 0);
         self.staging = None;
         self.open_updates.clear();
         self.need_keyframe()
@@ -313,6 +318,7 @@ impl MapFollower {
             self.keyframe_ns = None;
             self.history = self.history.then(sequence, open.sum);
             *at = sequence;
+            self.still_s = 0;
             if self.history != open.history {
                 return Err("other updates");
             }
@@ -355,8 +361,7 @@ impl MapFollower {
             });
         }
         self.newest = self.newest.max(staging.sequence);
-        staging.heard_at = self.newest;
-        self.quiet_s = 0;
+        (staging.heard_at, self.quiet_s) = (self.newest, 0);
         if staging.chunks.complete() {
             if let Err(why) = self.adopt(staging)? {
                 return Ok(self.differ(why));
@@ -377,6 +382,7 @@ impl MapFollower {
         if self.sequence.is_none_or(|at| done.sequence > at) {
             self.keyframe_ns = Some(map.stamp_ns);
             (self.sequence, self.history) = (Some(done.sequence), done.history);
+            self.still_s = 0;
         }
         self.keyframe_needed = false;
         self.patience_s = PATIENCE_S[0];
@@ -388,9 +394,7 @@ impl MapFollower {
 }
 
 fn check_chunk(chunk: u32, chunks: u32) -> Result<(), MapMessageError> {
-    if chunk < chunks && chunks <= MAX_CHUNKS {
-        Ok(())
-    } else {
-        Err(MapMessageError::Chunk { chunk, chunks })
-    }
+    let is_one = chunk < chunks && chunks <= MAX_CHUNKS;
+    let ok = is_one.then_some(());
+    ok.ok_or(MapMessageError::Chunk { chunk, chunks })
 }

@@ -1,5 +1,6 @@
 //! The merger as a ROS node: a thin shell around [`MapMerger`].
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
@@ -35,6 +36,9 @@ struct MergerReport<'a> {
     counts: &'a MergerCounts,
     voxels: usize,
     robots: Vec<(&'a str, usize)>,
+    /// By robot.
+    #[serde(flatten)]
+    losses: BTreeMap<String, u64>,
     updates_not_published: u64,
     chunks_not_published: u64,
 }
@@ -193,21 +197,25 @@ impl Shell {
         for (robot, share) in shares() {
             values.push((format!("{robot}_voxels"), share.voxels().to_string()));
         }
-        for (robot, input) in self.robots.iter().zip(&self.inputs) {
-            let losses = input.losses();
-            for (key, count) in [
-                ("inbox_full", losses.inbox_full()),
-                ("lost_on_network", losses.on_network()),
-            ] {
-                values.push((format!("{robot}_{key}"), count.to_string()));
-            }
-            values.push((
-                format!("{robot}_undecodable"),
-                losses.undecodable().to_string(),
-            ));
-        }
+        let losses = self.losses().into_iter();
+        values.extend(losses.map(|(key, count)| (key, count.to_string())));
         values.push(("voxels".into(), self.voxels().to_string()));
         self.diagnostics.set("merged map", level, message, values);
+    }
+
+    /// Messages of each robot that did not come to the machine.
+    fn losses(&self) -> BTreeMap<String, u64> {
+        let inputs = self.robots.iter().zip(&self.inputs);
+        let losses = inputs.flat_map(|(robot, input)| {
+            let losses = input.losses();
+            let counts = [
+                ("inbox_full", losses.inbox_full()),
+                ("lost_on_network", losses.on_network()),
+                ("undecodable", losses.undecodable()),
+            ];
+            counts.map(|(reason, count)| (format!("{robot}_{reason}"), count))
+        });
+        losses.collect()
     }
 
     fn voxels(&self) -> usize {
@@ -229,6 +237,7 @@ impl Shell {
             robots: shares
                 .map(|(robot, share)| (robot.as_str(), share.voxels()))
                 .collect(),
+            losses: self.losses(),
             updates_not_published: self.output.updates_lost(),
             chunks_not_published: self.output.chunks_lost(),
         };

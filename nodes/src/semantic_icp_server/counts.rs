@@ -76,3 +76,20 @@ impl ServerCounts {
             + self.clouds_malformed
     }
 }
+
+/// The end of a server.
+#[derive(Clone, Debug, Serialize)]
+pub struct ServerReport<'a> {
+    /// Everything counted by the state machine.
+    pub counts: &'a ServerCounts,
+    /// Messages that found the inbox, or the queue before it, full.
+    pub inbox_full: u64,
+    /// Messages that were sent and did not come.
+    pub lost_on_network: u64,
+    /// Samples that did not decode.
+    pub undecodable: u64,
+    /// Voxels of the map that it followed.
+    pub map_voxels: usize,
+    /// Times that the map was found to be another than its mapper's.
+    pub map_differences: u64,
+}

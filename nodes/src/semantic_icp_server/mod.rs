@@ -4,6 +4,7 @@
 //! a [`Job`] for another thread. [`node`] runs both behind DDS.
 
 mod counts;
+mod diagnosis;
 mod headset_scans;
 mod intake;
 pub mod node;
@@ -15,7 +16,7 @@ mod search;
 mod search_thread;
 mod state;
 
-pub use counts::ServerCounts;
+pub use counts::{ServerCounts, ServerReport};
 pub use options::{ByProfile, SearchWhen, ServerOptions, WhenBusy};
 pub use parameters::declare;
 pub use search::{Done, Job, LatticeSearch, MapCloud, Search, Work};

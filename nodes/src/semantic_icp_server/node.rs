@@ -14,10 +14,11 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::{Empty, String as StringMessage};
 use lattice_msgs::vision_msgs::LabelInfo;
 
+use super::diagnosis::diagnosis;
 use super::outputs::Outputs;
 use super::parameters::Settings;
 use super::search_thread::{SearchPort, SearchThread};
-use super::{CallId, End, LatticeSearch, Output, SemanticIcpServer, ServerOptions};
+use super::{CallId, End, LatticeSearch, Output, SemanticIcpServer, ServerOptions, ServerReport};
 use crate::compute::{Compute, Inbox};
 use crate::convert::cloud;
 use crate::report;
@@ -25,7 +26,7 @@ use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Level, Load, Losses, Reply, Runtime,
+    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Load, Losses, Reply, Runtime,
     Undecoded, lock,
 };
 
@@ -60,6 +61,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         search_threads,
         tf_period,
         mapper,
+        report_file,
     } = Settings::from_params(params)?;
     let search = LatticeSearch::new(server.calibration);
     let calibration = search.options();
@@ -79,6 +81,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         next_call: 0,
         requests: Throttle::new(Duration::from_secs(1)),
         refusals: Throttle::new(Duration::from_secs(5)),
+        report_file,
     };
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
         shell.on(event)
@@ -204,6 +207,7 @@ struct Shell {
     next_call: CallId,
     requests: Throttle,
     refusals: Throttle,
+    report_file: String,
 }
 
 impl Shell {
@@ -263,7 +267,11 @@ impl Shell {
                 self.machine.set_options(*options);
                 Vec::new()
             }
-            Event::Finish => self.machine.finish(),
+            Event::Finish => {
+                let outputs = self.machine.finish();
+                self.write_report();
+                outputs
+            }
         };
         self.put(outputs);
         self.look(now_ns);
@@ -355,40 +363,26 @@ impl Shell {
         }
     }
 
-    fn diagnose(&self) {
-        let counts = self.machine.counts();
-        let inbox_full = self.lost.load(Ordering::Relaxed) + self.losses.overrun();
-        let on_network = self.losses.on_network();
-        let last = self.machine.last_result();
-        let (level, message) = if self.machine.map_voxels() == 0 {
-            (Level::Warn, "no map yet".to_owned())
-        } else if counts.clouds_in == 0 {
-            (Level::Warn, "no cloud of the headset yet".to_owned())
-        } else if self.machine.map_from_headset().is_some() {
-            (Level::Ok, "calibrated".to_owned())
-        } else {
-            (Level::Warn, format!("not calibrated: {}", last.reason))
-        };
-        let mut values = report::key_values(counts);
-        values.extend([
-            ("inbox_full".into(), inbox_full.to_string()),
-            ("lost_on_network".into(), on_network.to_string()),
-            ("undecodable".into(), self.losses.undecodable().to_string()),
-            ("map_voxels".into(), self.machine.map_voxels().to_string()),
-            (
-                "map_differences".into(),
-                self.machine.map_differences().to_string(),
-            ),
-            ("session".into(), last.session.clone()),
-            ("last_reason".into(), last.reason.clone()),
-            ("method".into(), last.method.clone()),
-        ]);
-        for class in &last.class_reliability {
-            let name = self.machine.class_name(class.class_id);
-            let name = name.map_or_else(|| class.class_id.to_string(), str::to_owned);
-            let worth = format!("agrees {:.2}, weight {:.2}", class.agreement, class.weight);
-            values.push((format!("class {name}"), worth));
+    fn report(&self) -> ServerReport<'_> {
+        ServerReport {
+            counts: self.machine.counts(),
+            inbox_full: self.lost.load(Ordering::Relaxed) + self.losses.overrun(),
+            lost_on_network: self.losses.on_network(),
+            undecodable: self.losses.undecodable(),
+            map_voxels: self.machine.map_voxels(),
+            map_differences: self.machine.map_differences(),
         }
+    }
+
+    fn write_report(&self) {
+        let written = report::write(&self.report_file, &self.report(), &self.diagnostics);
+        if let Err(error) = written {
+            log::error!("{error}");
+        }
+    }
+
+    fn diagnose(&self) {
+        let (level, message, values) = diagnosis(&self.machine, &self.report());
         self.diagnostics.set("calibration", level, message, values);
     }
 }

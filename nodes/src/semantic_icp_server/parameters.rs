@@ -5,6 +5,7 @@ use std::time::Duration;
 use super::ServerOptions;
 use crate::compute::ComputeLimits;
 use crate::options::{self, FRAME};
+use crate::report;
 use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
 
@@ -53,6 +54,7 @@ pub(super) struct Settings {
     pub search_threads: usize,
     pub tf_period: Duration,
     pub mapper: String,
+    pub report_file: String,
 }
 
 impl Settings {
@@ -71,6 +73,7 @@ impl Settings {
             search_threads: options::threads(params, 0)?,
             tf_period: Duration::from_secs_f64(1.0 / rate_hz),
             mapper: params.string("mapper", "lattice_mapper")?,
+            report_file: report::file(params)?,
         })
     }
 }

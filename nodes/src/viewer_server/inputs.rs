@@ -153,6 +153,33 @@ mod tests {
     use super::*;
 
     #[test]
+    fn messages_are_counted_by_reason_as_diagnostics_show_them() {
+        use InputRefusal::*;
+        let inputs = Inputs::default();
+        inputs.taken(70);
+        let reasons = [
+            (TooLong, "headset_too_long"),
+            (TooMuch, "headset_too_much"),
+            (Busy, "headset_busy"),
+            (Malformed, "headset_malformed"),
+            (LongChunk, "headset_long_chunk"),
+            (LongNames, "headset_long_names"),
+            (NotSent, "headset_not_sent"),
+        ];
+        let mut expected = BTreeMap::from([("headset_in", 1), ("headset_bytes_in", 70)]);
+        for (number, (refusal, name)) in (1..).zip(reasons) {
+            (0..number).for_each(|_| inputs.refused(refusal));
+            expected.insert(name, number);
+        }
+        let shown = crate::report::key_values(&inputs.counts()).into_iter();
+        let expected = expected.into_iter();
+        let expected: BTreeMap<_, _> = expected
+            .map(|(key, count)| (key.to_owned(), count.to_string()))
+            .collect();
+        assert_eq!(shown.collect::<BTreeMap<_, _>>(), expected);
+    }
+
+    #[test]
     fn inputs_wait_in_half_of_the_inbox() {
         let waiting = Waiting::new(8, 1000);
         assert!(waiting.enter(500) && !waiting.enter(1));

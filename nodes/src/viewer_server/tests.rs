@@ -263,6 +263,24 @@ fn newest_messages_give_way_and_control_is_bounded() {
 }
 
 #[test]
+fn messages_to_clients_are_counted_and_those_that_give_way_too() {
+    let hub = Hub::new(2);
+    let channel = hub.channel::<Empty>("/newest", Class::Newest { depth: 2 }, false);
+    let (id, _woken) = hub.enter().unwrap();
+    hub.subscribe(id, 1, channel);
+    for _ in 0..5 {
+        hub.offer(channel, vec![0; 100]);
+    }
+    // What the server is, what it has, and the last two.
+    assert_eq!(std::iter::from_fn(|| hub.next(id)).count(), 4);
+    let counts = hub.counts();
+    assert_eq!((counts.messages_out, counts.bytes_out), (4, 200));
+    assert_eq!(counts.messages_dropped, 3);
+    hub.leave(id);
+    assert_eq!(hub.counts().messages_dropped, 3);
+}
+
+#[test]
 fn a_client_that_is_often_refused_silences_no_other() {
     let hub = Hub::new(2);
     let [(noisy, _noisy), (other, _other)] = [(); 2].map(|()| hub.enter().unwrap());

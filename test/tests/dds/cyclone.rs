@@ -223,6 +223,10 @@ fn a_cyclone_peer_feeds_the_nodes_and_rebuilds_the_map() {
     assert_eq!(mapper.voxels, direct.keys.len());
     let markers: MarkerReport = report::read(&path.join("voxel_marker_publisher")).unwrap();
     assert_eq!(markers.arrays_not_published, 0);
+    assert!(
+        markers.published_bytes as usize >= markers.marker_bytes / 2,
+        "{markers:?}"
+    );
     assert_eq!(markers.voxels, direct.keys.len());
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lattice_core::lattice::LatticeKind;
-use lattice_core::raycast::Evidence;
+use lattice_core::raycast::{Evidence, MIN_MAP_BYTES};
 use lattice_core::voxels::file::{MapContents, WriteOptions};
 use lattice_msgs::geometry_msgs::Point;
 use lattice_msgs::lattice::{ClearBoxRequest, QueryMapRequest};
@@ -165,6 +165,17 @@ fn clouds_without_the_place_of_the_sensor_clear_nothing_and_are_counted() {
         }
         assert_eq!(mapper.counts().clouds_no_viewpoint, 2);
         assert_eq!((mapper.cells().len(), mapper.counts().rays), (2, 0));
+    }
+}
+
+#[test]
+fn rays_without_room_are_counted() {
+    for (max_bytes, refuses) in [(MIN_MAP_BYTES, true), (256 << 20, false)] {
+        let mut options = options(FreeSpaceMethod::Evidence, MapPayload::Centroid);
+        options.free_space.clear.max_bytes = max_bytes;
+        let mut mapper = maps::mapper(options);
+        mapper.on_cloud(&Machine::new().wall(90.0)).unwrap();
+        assert_eq!(mapper.counts().ray_blocks_refused > 0, refuses);
     }
 }
 

@@ -60,6 +60,7 @@ fn refused_clouds_leave_the_map_as_it_is() {
     assert_eq!((counts.clouds_wrong_frame, counts.clouds_malformed), (1, 1));
     let points = (counts.points_not_finite, counts.points_out_of_range);
     assert_eq!(points, (2, 1));
+    assert_eq!((counts.points_in, counts.points_mapped), (1003, 1000));
 }
 
 #[test]

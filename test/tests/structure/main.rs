@@ -1,10 +1,12 @@
 //! Rules of the architecture that the compiler does not know.
 
+mod counters;
 mod crates;
 mod docs;
 mod launch;
 mod modules;
 mod params;
+mod security;
 mod source;
 mod supply;
 

@@ -57,6 +57,27 @@ fn crates_of_others_have_licences_and_sources_that_are_allowed() {
 }
 
 #[test]
+fn advisories_are_set_aside_only_for_crates_that_are_there() {
+    let text = fs::read_to_string(root().join("deny.toml")).unwrap();
+    let (_, ignored) = text.split_once("\nignore = [").unwrap();
+    let lock = fs::read_to_string(root().join("Cargo.lock")).unwrap();
+    let page = fs::read_to_string(root().join("docs/security.md")).unwrap();
+    let mut count = 0;
+    for line in ignored.lines().filter(|line| line.contains("id = ")) {
+        let quoted: Vec<_> = line.split('"').skip(1).step_by(2).collect();
+        let [id, reason] = quoted[..] else {
+            panic!("{line} has no reason");
+        };
+        let name = reason.split([' ', ',']).next().unwrap();
+        let is_there = lock.contains(&format!("\nname = \"{name}\"\n"));
+        assert!(is_there, "{id}: {name} is no longer used");
+        assert!(page.contains(id), "docs/security.md does not name {id}");
+        count += 1;
+    }
+    assert!(count > 0);
+}
+
+#[test]
 fn licences_are_read_as_alternatives() {
     let allowed = ["MIT", "Zlib"].map(str::to_owned);
     for (expression, met) in [

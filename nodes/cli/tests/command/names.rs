@@ -10,7 +10,7 @@ use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{LoopbackDomain, Runtime};
 
 use crate::record::{PEER, expect, start};
-use crate::{PATIENCE, error, python};
+use crate::{PATIENCE, error, lattice, python};
 
 const PARAMS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/bobcat.yaml");
 
@@ -50,6 +50,44 @@ fn unknown_parameters_are_refused_by_every_command() {
         ),
     ] {
         let line = error(command);
+        assert!(line.contains(expected), "{line}");
+    }
+}
+
+#[test]
+fn values_out_of_range_are_refused_with_their_range() {
+    for (node, wanted, expected) in [
+        (
+            "lattice_mapper",
+            "max_message_bytes:=1",
+            "`max_message_bytes` of /lattice_mapper = 1 (from the command line): expected a number from 1000 to 4294967295",
+        ),
+        (
+            "enu_transformer",
+            "points_topics:=[]",
+            "`points_topics` of /enu_transformer = [] (from the command line): expected at least one topic",
+        ),
+        (
+            "bag_player",
+            "duration_s:=-1.0",
+            "`duration_s` of /bag_player = -1.0 (from the command line): expected a number from 0.0 to 1000000000.0",
+        ),
+        (
+            "map_merger",
+            "robots:=[]",
+            "`robots` of /map_merger = [] (from the command line): expected names of robots, each once",
+        ),
+        (
+            "lattice_mapper",
+            "max_voxels:=0",
+            "`max_voxels` of /lattice_mapper = 0 (from the command line): expected 1 or more",
+        ),
+    ] {
+        let output = lattice(&["node", node, "--ros-args", "-p", wanted]);
+        assert!(!output.status.success(), "{wanted}");
+        // Behind what is said of sockets, if anything is.
+        let said = String::from_utf8(output.stderr).unwrap();
+        let line = said.lines().last().unwrap();
         assert!(line.contains(expected), "{line}");
     }
 }

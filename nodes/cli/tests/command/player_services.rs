@@ -188,6 +188,16 @@ fn services_are_answered_in_every_state() {
     let next = asked.call::<PlayNext>("play_next", &PlayNextRequest::default());
     assert!(next.success);
     asked.stop();
+    // So slow that the log is held again before its next message is due.
+    let slow = ["start_paused:=true", "loop:=true", "rate:=0.001"];
+    let asked = Asked::start(&domain, &log, &slow);
+    let (_clouds, heard) = listens(&asked.node, "/left/points");
+    let played = asked.burst(0);
+    heard.recv_timeout(PATIENCE).unwrap();
+    let _ = asked.call::<Resume>("resume", &ResumeRequest::default());
+    let _ = asked.call::<Pause>("pause", &PauseRequest::default());
+    assert!(played.recv_timeout(PATIENCE).unwrap() > 0);
+    asked.stop();
     // As fast as it goes.
     let asked = Asked::start(&domain, &log, &["rate:=1000.0", "loop:=true"]);
     let (_clouds, heard) = listens(&asked.node, "/left/points");

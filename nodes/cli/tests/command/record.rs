@@ -209,6 +209,13 @@ fn a_recording_of_a_system_at_work_gives_the_same_map() {
             "{name}: {report}"
         );
     }
+    for topic in topics {
+        assert_eq!(
+            (&topic["lost"], &topic["not_written"]),
+            (&0.into(), &0.into()),
+            "{topic}"
+        );
+    }
     let map = |log: &str| figures(&json(&["replay", "--direct", log, "--params", PARAMS]));
     assert_eq!(map(&bag), map(&log), "{report}");
 }

@@ -17,9 +17,9 @@ use lattice_cyclone_sys::{
 use smol::channel::Sender;
 
 use super::entity::{Entity, check, endpoint_id};
-use super::gaps::Gaps;
 use super::sample::{Taken, take};
 use crate::arrivals::Arrivals;
+use crate::gaps::Gaps;
 use crate::port::{EndpointId, PortEvent};
 use crate::qos::Qos;
 use crate::sync::lock;

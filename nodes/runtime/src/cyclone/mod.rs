@@ -8,7 +8,6 @@ mod discovery;
 mod domain;
 mod endpoint;
 mod entity;
-mod gaps;
 mod log;
 mod names;
 mod participant;

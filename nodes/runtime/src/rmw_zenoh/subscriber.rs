@@ -1,6 +1,5 @@
 //! Subscriptions: a callback on a thread of Zenoh stores samples and never blocks.
 
-use std::collections::BTreeMap;
 use std::iter;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -17,12 +16,10 @@ use zenoh_ext::{AdvancedSubscriber, AdvancedSubscriberBuilderExt, HistoryConfig,
 use super::attachment::read;
 use super::graph::{Graph, Place};
 use crate::arrivals::Arrivals;
-use crate::port::{EndpointId, Origin, ReaderLosses, SampleId, SampleReader};
+use crate::gaps::Gaps;
+use crate::port::{EndpointId, Origin, ReaderLosses, SampleReader};
 use crate::qos::{Durability, Qos, Reliability};
 use crate::sync::lock;
-
-/// Publishers whose numbers are followed, at most.
-const MAX_PUBLISHERS: usize = 4096;
 
 /// Timeout of the query to the caches of publishers.
 const HISTORY_TIMEOUT: Duration = Duration::from_secs(600);
@@ -78,32 +75,6 @@ impl Inbox {
     }
 }
 
-/// Numbers of publishers, whose gaps are samples that were lost.
-#[derive(Default)]
-struct Numbers {
-    last: Mutex<BTreeMap<EndpointId, i64>>,
-}
-
-impl Numbers {
-    /// Samples that are missing before this one.
-    fn note(&self, sample: &SampleId) -> u64 {
-        let mut last = lock(&self.last);
-        if last.len() >= MAX_PUBLISHERS && !last.contains_key(&sample.writer) {
-            // Who is known by then is followed anew.
-            last.clear();
-        }
-        let number = sample.number;
-        let known = last.entry(sample.writer).or_insert(number);
-        // Older ones are those of a cache.
-        if number <= *known {
-            return 0;
-        }
-        let gap = number.saturating_sub(*known).saturating_sub(1);
-        *known = number;
-        u64::try_from(gap).unwrap_or(0)
-    }
-}
-
 /// Reads an inbox, and holds its source.
 pub(super) struct InboxReader<S> {
     pub id: EndpointId,
@@ -137,11 +108,11 @@ impl InboxReader<Subscribed> {
         announce: impl FnOnce() -> zenoh::Result<(LivelinessToken, Place)>,
     ) -> zenoh::Result<Self> {
         let inbox = Inbox::new(qos.depth, max_bytes);
-        let numbers = Numbers::default();
+        let gaps = Mutex::new(Gaps::default());
         let (to, graph) = (Arc::clone(&inbox), Arc::clone(graph));
         let take = move |sample: Sample| {
             if sample.kind() == SampleKind::Put {
-                take(&sample, &to, &numbers, &graph);
+                take(&sample, &to, &gaps, &graph);
             }
         };
         let builder = session
@@ -179,12 +150,15 @@ impl InboxReader<Subscribed> {
     }
 }
 
-fn take(sample: &Sample, inbox: &Inbox, numbers: &Numbers, graph: &Graph) {
+/// Of a publisher, which Zenoh finds once.
+const HANDLE: u64 = 0;
+
+fn take(sample: &Sample, inbox: &Inbox, gaps: &Mutex<Gaps>, graph: &Graph) {
     let origin = match read(sample.attachment()) {
         // A cache of this process answers too.
         Ok(sample) if graph.is_ours(&sample.writer) => return,
         Ok(sample) => {
-            let missing = numbers.note(&sample);
+            let missing = lock(gaps).note(sample.writer, HANDLE, sample.number);
             inbox.losses().on_network.fetch_add(missing, Relaxed);
             Ok(Origin {
                 sample,
@@ -217,22 +191,7 @@ impl<S: Send + Sync> SampleReader for InboxReader<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn gaps_are_counted_for_each_publisher_and_what_is_old_is_not() {
-        let numbers = Numbers::default();
-        let note = |writer, number| {
-            numbers.note(&SampleId {
-                writer: EndpointId([writer; 16]),
-                number,
-            })
-        };
-        let heard = [(1, 5), (2, 1), (1, 6), (2, 2), (1, 3), (1, 4), (1, 9)];
-        let missing = heard.map(|(writer, number)| note(writer, number));
-        assert_eq!(missing, [0, 0, 0, 0, 0, 0, 2]);
-        note(3, i64::MIN);
-        note(3, i64::MAX);
-    }
+    use crate::port::SampleId;
 
     #[test]
     fn what_is_too_long_or_nameless_is_an_error_and_the_next_can_be_had() {

@@ -130,7 +130,9 @@ macro_rules! wait_for_match {
 }
 
 mod delivery;
+mod gaps;
 mod process;
+mod requests;
 mod stalled;
 
 /// Waits until `reached` is true, asked on a timer of the runtime.

@@ -1,6 +1,6 @@
 //! Clouds: waiting for poses, dropped by reason, deskewed, malformed.
 
-use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::enu_transformer::ins::{InsMessage, InsSource};
 use lattice_test::clouds::{SECOND_NS, cloud, field, odometry, points, timed_cloud};
@@ -186,6 +186,19 @@ fn points_without_meaning_are_left_out_by_reason() {
     assert_eq!((counts.points_in, counts.points_out), (5, 1));
     assert_eq!(counts.points_not_finite, 2);
     assert_eq!(counts.points_out_of_range, 2);
+}
+
+#[test]
+fn points_without_a_time_are_left_out_and_counted() {
+    let mut bench = Bench::odometry();
+    bench.drive(0, 10);
+    let mut message = timed_cloud("base_link", START_NS, &[([1.0, 0.0, 0.0], 0); 3]);
+    message.fields[3].datatype = PointField::FLOAT32;
+    let middle = message.point_step as usize;
+    message.data[middle + 12..middle + 16].copy_from_slice(&f32::NAN.to_le_bytes());
+    bench.cloud(message, START_NS);
+    let counts = bench.machine.counts();
+    assert_eq!((counts.points_out, counts.points_no_time), (2, 1));
 }
 
 #[test]

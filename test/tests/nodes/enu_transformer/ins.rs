@@ -23,6 +23,31 @@ fn poses_without_meaning_are_refused() {
     assert_eq!(bench.machine.counts().poses_in, 0);
 }
 
+#[test]
+fn poses_are_refused_and_counted_by_reason() {
+    let mut bench = Bench::odometry();
+    bench.drive(0, 20);
+    let at = |step: i64, east_m: f64| {
+        let place = Isometry3::translation(east_m, 0.0, 0.0);
+        odometry(START_NS + step * STEP_NS, &place)
+    };
+    // The stamp of the last one, again.
+    bench.pose(&at(19, 0.19));
+    // A kilometre away for a moment.
+    bench.pose(&at(20, 1000.0));
+    bench.drive(21, 40);
+    let counts = bench.machine.counts();
+    assert_eq!((counts.poses_in, counts.poses_out_of_order), (39, 1));
+    assert_eq!((counts.poses_too_fast, counts.place_jumps), (1, 0));
+    // And for longer than half a second.
+    for step in 40..100 {
+        bench.pose(&at(step, 1000.0));
+    }
+    let counts = bench.machine.counts();
+    assert_eq!((counts.poses_in, counts.poses_too_fast), (99, 1));
+    assert_eq!((counts.place_jumps, counts.poses_refused()), (1, 2));
+}
+
 const PLACE_M: Vector3<f64> = Vector3::new(300.0, -200.0, 4.0);
 
 /// A place some way from the origin, and how a machine stands there.

@@ -47,6 +47,17 @@ fn an_unknown_mount_is_a_reason_of_its_own() {
 }
 
 #[test]
+fn transforms_that_are_none_are_counted() {
+    let mut bench = Bench::odometry();
+    let nowhere = Isometry3::translation(f64::NAN, 0.0, 0.0);
+    for is_static in [true, false] {
+        bench.tf("base_link", "laser", 0, &nowhere, is_static);
+    }
+    bench.tf("base_link", "laser", 0, &Isometry3::identity(), true);
+    assert_eq!(bench.machine.counts().transforms_refused, 2);
+}
+
+#[test]
 fn the_odometry_frame_is_published_though_odometry_comes_after_the_pose() {
     let mut bench = Bench::new(TransformerOptions {
         odom_frame: Some("odom".into()),

@@ -61,6 +61,14 @@ fn surfaces_are_replaced_and_removed() {
     assert_eq!(seen_m(&mut machine, AT_NS + 3), Some(4.0));
     let counts = machine.counts();
     assert_eq!((counts.surfaces_replaced, counts.surfaces_removed), (3, 1));
+    assert_eq!((counts.meshes_in, counts.labels_in), (5, 4));
+    // Every pixel is a point, or is left out for a reason.
+    let [width, height] = HouseScan::PIXELS;
+    let pixels = &counts.look;
+    assert_eq!(pixels.pixels, 4 * (width * height) as u64);
+    let left_out = pixels.pixels_no_ray + pixels.pixels_no_mesh;
+    assert_eq!(pixels.points + left_out, pixels.pixels);
+    assert!(pixels.pixels_no_mesh > 0 && pixels.points > 0);
 }
 
 #[test]
@@ -182,6 +190,39 @@ fn a_session_begins_whatever_its_clock_says() {
     machine.at(14 * SECOND_NS);
     let told = machine.on_mesh(&Arc::new(of("of 1970", 6)));
     assert_eq!(told, [HeadsetOutput::Session("of 1970".to_owned())]);
+}
+
+#[test]
+fn a_clock_that_is_set_back_by_seconds_holds_up_no_state() {
+    const SECOND_NS: i64 = 1_000_000_000;
+    let mut machine = machine(&[]);
+    let mut on_mesh = |arrival_s: i64, stamp_s: i64, by_m: f32| {
+        machine.at(arrival_s * SECOND_NS);
+        machine.on_mesh(&Arc::new(shifted(by_m, stamp_s * SECOND_NS)));
+        let stale = machine.counts().dropped.get("mesh_stale");
+        stale.copied().unwrap_or(0)
+    };
+    // Overtaken: sent 5 s before the one that is known, and 9 s on the way.
+    assert_eq!(on_mesh(100, 100, 0.0), 0);
+    assert_eq!(on_mesh(104, 95, -1.0), 1);
+    // The clock is set back by 30 s: what is sent after that is no message of before.
+    assert_eq!(on_mesh(106, 76, -2.0), 1);
+    assert_eq!(seen_m(&mut machine, AT_NS), Some(1.0));
+}
+
+#[test]
+fn images_of_a_clock_that_was_ahead_keep_no_place() {
+    let mut machine = machine(&[("queue_size", "2"), ("max_pose_gap_s", "2.0")]);
+    machine.on_mesh(&Arc::new(square()));
+    // They wait for poses that never come.
+    for late in 0..3 {
+        assert!(look(&mut machine, i64::from(i32::MAX) * 1_000_000_000 + late).is_empty());
+    }
+    assert_eq!(machine.waiting(), [2, 0]);
+    for image in 0..3 {
+        assert_eq!(seen_m(&mut machine, AT_NS + image), Some(3.0), "{image}");
+    }
+    assert_eq!(machine.counts().dropped["labels_no_pose"], 2);
 }
 
 #[test]

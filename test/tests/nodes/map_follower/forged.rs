@@ -90,6 +90,34 @@ fn a_forged_keyframe_is_noticed_by_the_next_update() {
 }
 
 #[test]
+fn a_forged_keyframe_of_a_time_to_come_is_noticed_within_seconds() {
+    for ahead in [3, 1 << 40] {
+        let mut mapper = mapper(LatticeKind::Fcc);
+        let mut follower = maps::follower(&mut mapper);
+        let mut forged = maps::mapper(maps::options(LatticeKind::Fcc, 0.125));
+        insert(&mut forged, &scatter(9, 50_000, [50.0; 3], 90.0));
+        for mut chunk in forged.keyframe() {
+            chunk.sequence = ahead;
+            chunk.header.stamp = Time::from_ns(i64::MAX);
+            assert_eq!(follower.on_map(&chunk).unwrap(), Followed::Applied);
+        }
+        // An update a second: at first they may be those of before that keyframe.
+        let mut seconds = 0;
+        while follower.differences() == 0 {
+            assert!(seconds < 7, "not noticed");
+            seconds += 1;
+            follower.wait_a_second();
+            insert(&mut mapper, &scatter(seconds, 5, [3.0; 3], 9.0));
+            let update = mapper.take_update();
+            follower.on_update(&update[0]).unwrap();
+        }
+        follow_keyframe(&mut follower, &mut mapper);
+        assert_same(&follower, &mapper);
+        assert_eq!(follower.differences(), 1);
+    }
+}
+
+#[test]
 fn updates_that_a_keyframe_has_overtaken_are_no_forgery() {
     let mut mapper = mapper(LatticeKind::Fcc);
     let mut follower = maps::follower(&mut mapper);

@@ -176,6 +176,29 @@ fn ranges_strides_and_holes_leave_pixels_out() {
 }
 
 #[test]
+fn pixels_that_the_distortion_does_not_reach_are_counted() {
+    let mut machine = SemanticCloud::new(options(&[]));
+    let straight = Camera::new(&camera_info("plumb_bob", &[]), false).unwrap();
+    // The image ends before its corners.
+    machine.on_camera_info(Arc::new(camera_info(
+        "plumb_bob",
+        &[-0.9, 0.0, 0.0, 0.0, 0.0],
+    )));
+    let labels = labels(&straight, 0, 1, Form::plain("mono8"));
+    machine.on_image(Stream::Labels, Arc::new(labels));
+    let depth = depth(&straight, 0, Form::plain("32FC1"));
+    let clouds = clouds(machine.on_image(Stream::Depth, Arc::new(depth)));
+    let counts = &machine.counts().points;
+    assert!(counts.pixels_no_ray > 0, "{counts:?}");
+    let left_out = counts.pixels_no_depth + counts.pixels_at_edges + counts.pixels_out_of_range;
+    assert_eq!(
+        left_out + counts.pixels_no_ray + counts.points,
+        counts.pixels
+    );
+    assert_eq!(points(&clouds[0]).len() as u64, counts.points);
+}
+
+#[test]
 fn classes_are_ignored_grouped_and_named() {
     let params = [
         ("ignored_labels", "[1]"),
@@ -233,6 +256,11 @@ fn confidences_come_along_and_weak_labels_are_none() {
     let confidence = Form::plain("mono8").image(0, half, &numbers);
     machine.on_image(Stream::Confidence, Arc::new(confidence));
     let clouds = clouds(machine.finish());
+    let counts = machine.counts();
+    assert_eq!(
+        (counts.depth_in, counts.labels_in, counts.confidence_in),
+        (1, 1, 1)
+    );
     for point in points(&clouds[0]) {
         let is_left = camera.project(point.place_m.into())[0] < f64::from(half) - 0.5;
         assert_eq!(point.label == u16::MAX, is_left);

@@ -100,6 +100,10 @@ fn several_headset_scans_are_searched_together_and_bad_ones_dropped() {
     assert_eq!(scans, [3, 1], "those said nothing");
     bench.cloud(&good());
     assert_eq!((bench.verdict(), bench.search.headset_scans[6]), (OK, 1));
+    let counts = bench.machine.counts();
+    let not_found = [counts.searches_ambiguous, counts.searches_degenerate];
+    assert_eq!((not_found, counts.searches_no_overlap), ([3, 1], 1));
+    assert_eq!((counts.searches_rejected, counts.searches_ok), (1, 1));
 
     // Clouds of one second are one look.
     let mut bench = self::bench(ServerOptions {
