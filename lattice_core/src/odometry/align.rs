@@ -1,9 +1,12 @@
 //! Registration of a scan with the map: Gauss-Newton on SE(3), from points to planes or points.
 
-use nalgebra::{Cholesky, Isometry3, Matrix6, SymmetricEigen, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{
+    Cholesky, Isometry3, Matrix3, Matrix6, SymmetricEigen, UnitQuaternion, Vector3, Vector6,
+};
 use rayon::prelude::*;
 
 use super::moment_map::MomentMap;
+use super::verdict::WeakDirection;
 
 /// Points of one task; sums of tasks are added in order, so that threads change no bit.
 const CHUNK: usize = 256;
@@ -19,10 +22,17 @@ const KERNEL: f64 = 3.0;
 struct Equations {
     information: Matrix6<f64>,
     gradient: Vector6<f64>,
-    /// Normals of planes with their lever arms, less what their uncertainty adds: information by direction.
-    geometry: Matrix6<f64>,
+    geometry: Geometry,
     weight: f64,
-    matched: usize,
+}
+
+/// What planes show of motions (translation, rotation about the base, axes of the map): sums over points on planes.
+#[derive(Clone, Debug)]
+pub(super) struct Geometry {
+    /// Squared displacement along normals, less what the uncertainty of normals adds.
+    observed: Matrix6<f64>,
+    /// Squared displacement.
+    displaced: Matrix6<f64>,
 }
 
 impl Equations {
@@ -30,18 +40,20 @@ impl Equations {
         Equations {
             information: Matrix6::zeros(),
             gradient: Vector6::zeros(),
-            geometry: Matrix6::zeros(),
+            geometry: Geometry {
+                observed: Matrix6::zeros(),
+                displaced: Matrix6::zeros(),
+            },
             weight: 0.0,
-            matched: 0,
         }
     }
 
     fn plus(mut self, other: &Equations) -> Equations {
         self.information += other.information;
         self.gradient += other.gradient;
-        self.geometry += other.geometry;
+        self.geometry.observed += other.geometry.observed;
+        self.geometry.displaced += other.geometry.displaced;
         self.weight += other.weight;
-        self.matched += other.matched;
         self
     }
 }
@@ -52,28 +64,23 @@ pub(super) struct Alignment {
     pub map_from_base: Isometry3<f64>,
     /// Of a perturbation (translation, rotation) in the axes of the map about the base, m and rad.
     pub information: Matrix6<f64>,
-    /// Part of the points whose planes hold each direction, as a matrix; rotations in units of `arm_m`.
-    pub geometry: Matrix6<f64>,
+    pub geometry: Geometry,
     /// Part of the points that the map explains.
     pub overlap: f64,
 }
 
-/// Directions that a solution leaves at the guess: an orthonormal basis, rotations in units of `arm_m`.
-pub(super) type Held = Vec<Vector6<f64>>;
-
-/// Moves points (base frame, metres) onto the map from a guess; `held` directions stay at the guess.
+/// Moves points (base frame, metres) onto the map from a guess; the motions `held` stay as in the guess.
 pub(super) fn align(
     map: &MomentMap,
     points_m: &[Vector3<f64>],
     guess: &Isometry3<f64>,
     gate_m: f64,
-    arm_m: f64,
     held: &Held,
 ) -> Alignment {
     let mut pose = *guess;
-    let free = free_part(held, arm_m);
+    let free = held.free();
     for _ in 0..MAX_ITERATIONS {
-        let equations = linearize(map, points_m, &pose, gate_m, arm_m);
+        let equations = linearize(map, points_m, &pose, gate_m);
         let Some(step) = solve(&equations, &free) else {
             break;
         };
@@ -86,12 +93,12 @@ pub(super) fn align(
             break;
         }
     }
-    let end = linearize(map, points_m, &pose, gate_m, arm_m);
+    let end = linearize(map, points_m, &pose, gate_m);
     let count = points_m.len().max(1) as f64;
     Alignment {
         map_from_base: pose,
         information: end.information,
-        geometry: end.geometry / count,
+        geometry: end.geometry,
         overlap: end.weight / count,
     }
 }
@@ -105,22 +112,9 @@ pub(super) fn perturbed(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3
     )
 }
 
-/// Projector onto the directions that are not held, in metres and radians.
-fn free_part(held: &Held, arm_m: f64) -> Matrix6<f64> {
-    let scale = scales(arm_m);
-    let held = held.iter().map(|v| v * v.transpose());
-    let free = held.fold(Matrix6::identity(), |free, part| free - part);
-    // Scaled coordinates are (translation, arm * rotation).
-    Matrix6::from_diagonal(&scale.map(|s| 1.0 / s)) * free * Matrix6::from_diagonal(&scale)
-}
-
-fn scales(arm_m: f64) -> Vector6<f64> {
-    Vector6::new(1.0, 1.0, 1.0, arm_m, arm_m, arm_m)
-}
-
 fn solve(equations: &Equations, free: &Matrix6<f64>) -> Option<Vector6<f64>> {
     let information = free.transpose() * equations.information * free;
-    // Held directions get the information of a point, so that the matrix is regular; their gradient is 0.
+    // Regular along what is held, where the gradient is 0.
     let damping = 1e-9 * information.trace().max(1e-9);
     let information = information + Matrix6::identity() * damping;
     let step = Cholesky::new(information)?.solve(&(-free.transpose() * equations.gradient));
@@ -133,14 +127,13 @@ fn linearize(
     points_m: &[Vector3<f64>],
     pose: &Isometry3<f64>,
     gate_m: f64,
-    arm_m: f64,
 ) -> Equations {
     let parts: Vec<Equations> = points_m
         .par_chunks(CHUNK)
         .map(|points| {
             let mut sums = Equations::zero();
             for point in points {
-                add_point(&mut sums, map, point, pose, gate_m, arm_m);
+                add_point(&mut sums, map, point, pose, gate_m);
             }
             sums
         })
@@ -154,7 +147,6 @@ fn add_point(
     point: &Vector3<f64>,
     pose: &Isometry3<f64>,
     gate_m: f64,
-    arm_m: f64,
 ) {
     let arm = pose.rotation * point;
     let moved = arm + pose.translation.vector;
@@ -167,54 +159,90 @@ fn add_point(
     let weight = ratio * ratio;
     // The Jacobian is [I, -arm x].
     let cross = arm.cross_matrix();
-    let rotated = cross * surface.information;
-    let mut add = |row: usize, column: usize, block: &nalgebra::Matrix3<f64>| {
-        let mut part = sums.information.fixed_view_mut::<3, 3>(row, column);
-        part += block * weight;
-    };
-    add(0, 0, &surface.information);
-    add(3, 0, &rotated);
-    add(0, 3, &rotated.transpose());
-    add(3, 3, &(rotated * cross.transpose()));
+    sums.information += sandwiched(&surface.information, &cross) * weight;
     let mut gradient = sums.gradient.fixed_rows_mut::<3>(0);
     gradient += pull * weight;
     let mut gradient = sums.gradient.fixed_rows_mut::<3>(3);
     gradient += arm.cross(&pull) * weight;
     sums.weight += weight;
-    sums.matched += 1;
     if let Some(plane) = &surface.plane {
-        let lever = arm / arm_m;
-        let turn = lever.cross(&plane.normal);
-        let mut row = Vector6::zeros();
-        row.fixed_rows_mut::<3>(0).copy_from(&plane.normal);
-        row.fixed_rows_mut::<3>(3).copy_from(&turn);
-        let cross = lever.cross_matrix();
-        let mut spread = Matrix6::zeros();
-        let tilted = cross * plane.tilt;
-        spread.fixed_view_mut::<3, 3>(0, 0).copy_from(&plane.tilt);
-        spread.fixed_view_mut::<3, 3>(3, 0).copy_from(&tilted);
-        spread
-            .fixed_view_mut::<3, 3>(0, 3)
-            .copy_from(&tilted.transpose());
-        spread
-            .fixed_view_mut::<3, 3>(3, 3)
-            .copy_from(&(tilted * cross.transpose()));
-        sums.geometry += (row * row.transpose() - spread) * weight;
+        // The columns of [I, -arm x] along the normal, and its uncertainty.
+        let turn = arm.cross(&plane.normal);
+        let (n, r) = (plane.normal, turn);
+        let row = Vector6::new(n.x, n.y, n.z, r.x, r.y, r.z);
+        let spread = sandwiched(&plane.tilt, &cross);
+        sums.geometry.observed += (row * row.transpose() - spread) * weight;
+        sums.geometry.displaced += sandwiched(&Matrix3::identity(), &cross) * weight;
     }
 }
 
-/// Directions in which fewer than `least` of the points hold the scan, weakest first, each with its part.
-pub(super) fn weak_directions(geometry: &Matrix6<f64>, least: f64) -> Vec<(f64, Vector6<f64>)> {
-    let eigen = SymmetricEigen::new(*geometry);
-    let mut weak: Vec<(f64, Vector6<f64>)> = (0..6)
-        .map(|i| {
-            (
-                eigen.eigenvalues[i],
-                eigen.eigenvectors.column(i).into_owned(),
-            )
-        })
-        .filter(|(part, _)| *part < least)
-        .collect();
-    weak.sort_by(|a, b| a.0.total_cmp(&b.0));
-    weak
+/// `Jᵀ M J` with `J = [I, -arm x]`.
+fn sandwiched(m: &Matrix3<f64>, cross: &Matrix3<f64>) -> Matrix6<f64> {
+    let turned = cross * m;
+    let mut all = Matrix6::zeros();
+    let mut put = |row: usize, column: usize, block: &Matrix3<f64>| {
+        all.fixed_view_mut::<3, 3>(row, column).copy_from(block);
+    };
+    put(0, 0, m);
+    put(3, 0, &turned);
+    put(0, 3, &turned.transpose());
+    put(3, 3, &(turned * cross.transpose()));
+    all
+}
+
+/// Motions that a solution leaves as in the guess.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Held {
+    motions: Vec<Vector6<f64>>,
+    displaced: Matrix6<f64>,
+}
+
+impl Held {
+    /// Projector onto the motions whose displacements are perpendicular to the held ones.
+    fn free(&self) -> Matrix6<f64> {
+        let held = self
+            .motions
+            .iter()
+            .map(|m| m * (m.transpose() * self.displaced));
+        held.fold(Matrix6::identity(), |free, part| free - part)
+    }
+}
+
+impl Geometry {
+    /// Motions that are observed in less than a part of the displacements that they make, weakest first, and the part of
+    /// the weakest of all motions.
+    ///
+    /// Eigenvectors of `observed` relative to `displaced`.
+    pub fn weak(&self, least: f64) -> (Vec<WeakDirection>, f64) {
+        let unit = self.displaced / (self.displaced.trace() / 6.0).max(f64::MIN_POSITIVE);
+        let Some(factor) = Cholesky::new(unit).and(Cholesky::new(self.displaced)) else {
+            let all = (0..6).map(|i| WeakDirection {
+                motion: Vector6::from_fn(|row, _| f64::from(u8::from(row == i))),
+                part: 0.0,
+            });
+            return (all.collect(), 0.0);
+        };
+        let lower = factor.l();
+        let Some(inverse) = lower.try_inverse() else {
+            return (Vec::new(), 0.0);
+        };
+        let eigen = SymmetricEigen::new(inverse * self.observed * inverse.transpose());
+        let mut weak: Vec<WeakDirection> = (0..6)
+            .map(|i| WeakDirection {
+                motion: inverse.transpose() * eigen.eigenvectors.column(i),
+                part: eigen.eigenvalues[i],
+            })
+            .filter(|weak| weak.part < least)
+            .collect();
+        weak.sort_by(|a, b| a.part.total_cmp(&b.part));
+        (weak, eigen.eigenvalues.min())
+    }
+
+    /// Holds directions that are weak here.
+    pub fn hold(&self, weak: &[WeakDirection]) -> Held {
+        Held {
+            motions: weak.iter().map(|weak| weak.motion).collect(),
+            displaced: self.displaced,
+        }
+    }
 }

@@ -10,14 +10,14 @@ mod moment_map;
 mod moments;
 mod motion;
 mod sampling;
-mod sweep;
-mod verdict;
-
+mod submap;
 mod surface;
+mod sweep;
 #[cfg(test)]
 mod tests;
+mod verdict;
 
-use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Vector3};
 
 pub use moment_map::MomentMap;
 pub use moments::Moments;
@@ -27,29 +27,14 @@ pub use sweep::AngularRate;
 pub use verdict::{LostCause, Verdict, WeakDirection};
 
 use crate::cloud::NO_TIME_NS;
-use crate::lattice::{Lattice, LatticeError, LatticeKind};
-use align::{Alignment, Held, align, weak_directions};
-use motion::{Motion, carried, seconds};
-use sampling::Sample;
+use crate::lattice::{LatticeError, LatticeKind};
+use submap::Submap;
 use sweep::Sweep;
-use verdict::{Evidence, WEAK_PART, can_begin, judge};
+use verdict::{Evidence, can_begin, judge, weak_part};
 
-/// Registrations of a scan, each deskewed by the velocity that the one before found.
-const PASSES: usize = 2;
-/// Cells of the map, at 400 bytes each.
-const MAX_CELLS: usize = 500_000;
-/// Distance to which the map is kept, in largest distances of points of a scan.
-const KEPT_RANGES: f64 = 1.5;
-/// Scans of a new map that are added wherever the base is.
-const FIRST_SCANS: usize = 5;
-/// Time between scans beyond which motion cannot be predicted, in seconds.
-const MAX_GAP_S: f64 = 0.5;
-/// Time for which a lost scan is looked for in the map before a new submap begins, in seconds.
-const RESUME_S: f64 = 1.0;
-/// Weight of the newest overlap in its mean.
-const NEWEST: f64 = 0.1;
-/// Factor from the inverse of the information to the covariance: points of a cell share its errors.
-const CORRELATION: f64 = 25.0;
+/// Registrations of a scan, each deskewed by the velocity that the one before found: usually, and where the map explains
+/// less of it than usual.
+const PASSES: (usize, usize) = (2, 4);
 
 /// Options of the odometry.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,8 +97,19 @@ pub struct ScanResult {
     pub overlap: f64,
     /// Points that were registered.
     pub points: usize,
-    /// Part of the points whose planes hold the weakest direction.
+    /// Part of the displacement of points by the weakest motion that planes show.
     pub weakest: f64,
+}
+
+impl ScanResult {
+    /// The same with the pose at the time of the first point.
+    pub fn at_first(&self) -> ScanResult {
+        ScanResult {
+            end_ns: self.first_ns,
+            odom_from_base: self.odom_from_first,
+            ..self.clone()
+        }
+    }
 }
 
 /// Odometry by scans.
@@ -122,34 +118,6 @@ pub struct Odometry {
     options: OdometryOptions,
     submap: Option<Submap>,
     submaps: u32,
-}
-
-/// The map of the scans before and the motion in it.
-#[derive(Clone)]
-struct Submap {
-    number: u32,
-    map: MomentMap,
-    sizes: Sizes,
-    motion: Motion,
-    end_ns: i64,
-    odom_from_base: Isometry3<f64>,
-    /// Without that of the last registration.
-    covariance: Matrix6<f64>,
-    usual_overlap: f64,
-    scans: usize,
-    /// Pose of the scan added last.
-    added_at: Isometry3<f64>,
-    lost_since_ns: Option<i64>,
-    /// The first scan while it is the whole map.
-    first: Option<FirstScan>,
-}
-
-/// A scan that was added before its velocity was known.
-#[derive(Clone)]
-struct FirstScan {
-    points_m: Vec<Vector3<f64>>,
-    times_ns: Vec<i64>,
-    span_ns: (i64, i64),
 }
 
 impl Odometry {
@@ -180,29 +148,31 @@ impl Odometry {
         // Register, deskewed by the predicted velocity, then by the one found.
         let mut velocity = submap.motion.velocity();
         let mut found = guess;
-        for _ in 1..PASSES {
+        let mut pass = 1;
+        let (sample, alignment) = loop {
             let sweep = Sweep::new(first_ns, end_ns, &velocity, prior.rates);
             let points_m = sweep.deskew(scan.points_m, scan.times_ns);
             let sample = submap.sizes.sample(&points_m, kind)?;
-            found = submap.align(&sample, &found, &Held::new()).map_from_base;
+            let alignment = submap.align_around(&sample, &found);
+            let is_usual = !submap.is_suspicious(&alignment);
+            if pass >= if is_usual { PASSES.0 } else { PASSES.1 } {
+                break (sample, alignment);
+            }
+            pass += 1;
+            found = alignment.map_from_base;
             velocity = submap.velocity_to(&found, end_ns);
             submap.deskew_first(&velocity, kind)?;
-        }
-        let sweep = Sweep::new(first_ns, end_ns, &velocity, prior.rates);
-        let points_m = sweep.deskew(scan.points_m, scan.times_ns);
-        let sample = submap.sizes.sample(&points_m, kind)?;
-        let alignment = submap.align(&sample, &found, &Held::new());
+        };
 
         // Leave what the map does not show to the prediction.
-        let weak = weak_directions(&alignment.geometry, WEAK_PART);
-        let held: Held = weak.iter().map(|(_, direction)| *direction).collect();
-        let alignment = match held.is_empty() {
+        let (weak, weakest) = alignment.geometry.weak(weak_part(was_lost));
+        let alignment = match weak.is_empty() {
             true => alignment,
-            false => submap.align(&sample, &guess, &held),
+            false => submap.align(&sample, &guess, &alignment.geometry.hold(&weak)),
         };
 
         // Judge, and grow the map by what is certain.
-        let weak_m = match held.is_empty() {
+        let weak_m = match weak.is_empty() {
             true => 0.0,
             false => submap.motion.add_weak(&predicted, prior),
         };
@@ -211,13 +181,11 @@ impl Odometry {
             overlap: alignment.overlap,
             usual_overlap: submap.usual_overlap,
             was_lost,
-            weak: weak
-                .iter()
-                .map(|weak| direction(weak, sample.arm_m))
-                .collect(),
+            weak,
             weak_m,
         });
-        Ok(submap.follow((first_ns, end_ns), &sample, &alignment, &guess, verdict))
+        let result = submap.follow((first_ns, end_ns), &sample, &alignment, &guess, verdict);
+        Ok(ScanResult { weakest, ..result })
     }
 
     /// Begins a submap with a scan, where the motion of the one before leads.
@@ -247,25 +215,7 @@ impl Odometry {
         if !can_begin(sample.registered_m.len()) {
             return Ok(result);
         }
-        let lattice = Lattice::new(kind, sizes.map_m.powi(3))?;
-        let mut submap = Submap {
-            number: self.submaps,
-            map: MomentMap::new(lattice, MAX_CELLS),
-            sizes,
-            motion: Motion::unknown(),
-            end_ns,
-            odom_from_base,
-            covariance: Matrix6::zeros(),
-            usual_overlap: 0.0,
-            scans: 0,
-            added_at: odom_from_base,
-            lost_since_ns: None,
-            first: scan.times_ns.map(|times_ns| FirstScan {
-                points_m: scan.points_m.to_vec(),
-                times_ns: times_ns.to_vec(),
-                span_ns: (first_ns, end_ns),
-            }),
-        };
+        let mut submap = Submap::new(self.submaps, scan, sizes, kind, odom_from_base)?;
         submap.grow(&sample);
         self.submaps += 1;
         self.submap = Some(submap);
@@ -281,173 +231,5 @@ impl Odometry {
     /// Sizes of cells in use.
     pub fn sizes(&self) -> Option<Sizes> {
         self.submap.as_ref().map(|submap| submap.sizes)
-    }
-}
-
-impl Submap {
-    fn is_lost(&self, end_ns: i64) -> bool {
-        self.lost_since_ns.is_some() || seconds(self.end_ns, end_ns) > MAX_GAP_S
-    }
-
-    fn is_given_up(&self, end_ns: i64) -> bool {
-        let since = self.lost_since_ns;
-        since.is_some_and(|since_ns| seconds(since_ns, end_ns) > RESUME_S)
-    }
-
-    fn velocity_to(&self, odom_from_base: &Isometry3<f64>, end_ns: i64) -> Vector6<f64> {
-        let motion = self.odom_from_base.inverse() * odom_from_base;
-        let seconds = seconds(self.end_ns, end_ns);
-        match seconds > 0.0 {
-            true => crate::pose::se3::log(&motion) / seconds,
-            false => Vector6::zeros(),
-        }
-    }
-
-    fn align(&self, sample: &Sample, guess: &Isometry3<f64>, held: &Held) -> Alignment {
-        let (points, gate_m) = (&sample.registered_m, self.motion.gate_m());
-        align(&self.map, points, guess, gate_m, sample.arm_m, held)
-    }
-
-    /// Makes the map anew from its only scan, deskewed by the velocity that the second one shows.
-    fn deskew_first(
-        &mut self,
-        velocity: &Vector6<f64>,
-        kind: LatticeKind,
-    ) -> Result<(), LatticeError> {
-        let Some(first) = &self.first else {
-            return Ok(());
-        };
-        let sweep = Sweep::new(first.span_ns.0, first.span_ns.1, velocity, &[]);
-        let points_m = sweep.deskew(&first.points_m, Some(&first.times_ns));
-        let sample = self.sizes.sample(&points_m, kind)?;
-        self.map = MomentMap::new(self.map.lattice().clone(), MAX_CELLS);
-        self.scans = 0;
-        self.grow(&sample);
-        Ok(())
-    }
-
-    /// Takes a judged scan: pose, motion, covariance, and the map if it is certain.
-    fn follow(
-        &mut self,
-        (first_ns, end_ns): (i64, i64),
-        sample: &Sample,
-        alignment: &Alignment,
-        guess: &Isometry3<f64>,
-        verdict: Verdict,
-    ) -> ScanResult {
-        let before = self.odom_from_base;
-        let is_lost = matches!(verdict, Verdict::Lost(_));
-        self.odom_from_base = match is_lost {
-            true => *guess,
-            false => alignment.map_from_base,
-        };
-        let displacement = self.odom_from_base.translation.vector - before.translation.vector;
-        self.covariance = carried(&self.covariance, &displacement);
-        let registration = covariance_of(alignment, self.motion.weak_m(), &verdict, sample.arm_m);
-        let span_s = seconds(self.end_ns, end_ns);
-        if is_lost {
-            self.lost_since_ns.get_or_insert(end_ns);
-        } else {
-            let (found, predicted) = (
-                before.inverse() * self.odom_from_base,
-                before.inverse() * guess,
-            );
-            self.motion.update(&found, &predicted, span_s, sample.arm_m);
-            self.lost_since_ns = None;
-        }
-        if verdict == Verdict::Ok {
-            self.first = None;
-            self.motion.end_weak();
-            let newest = if self.usual_overlap > 0.0 {
-                NEWEST
-            } else {
-                1.0
-            };
-            self.usual_overlap += newest * (alignment.overlap - self.usual_overlap);
-            // As the base moves by the range of its points, the map is replaced, with the error of one registration.
-            let replaced = (displacement.norm() / sample.arm_m).min(1.0);
-            self.covariance += registration * replaced;
-            if self.is_elsewhere(sample.arm_m) || self.scans < FIRST_SCANS {
-                self.grow(sample);
-            }
-        }
-        self.end_ns = end_ns;
-        self.sizes.follow(sample);
-        let weakest = nalgebra::SymmetricEigen::new(alignment.geometry)
-            .eigenvalues
-            .min();
-        let sweep = Sweep::new(first_ns, end_ns, &self.motion.velocity(), &[]);
-        ScanResult {
-            first_ns,
-            odom_from_first: self.odom_from_base * sweep.first(),
-            end_ns,
-            odom_from_base: self.odom_from_base,
-            covariance: self.covariance + registration,
-            verdict,
-            submap: self.number,
-            overlap: alignment.overlap,
-            points: sample.registered_m.len(),
-            weakest,
-        }
-    }
-
-    /// True if points of the scan lie half a centroid's cell from where the last ones were added: an independent
-    /// observation. A base at rest adds nothing, so that its map does not creep.
-    fn is_elsewhere(&self, arm_m: f64) -> bool {
-        let apart = self.added_at.inverse() * self.odom_from_base;
-        let moved_m = apart.translation.vector.norm() + arm_m * apart.rotation.angle();
-        moved_m > self.sizes.centroids_m / 2.0
-    }
-
-    fn grow(&mut self, sample: &Sample) {
-        let pose = self.odom_from_base;
-        let placed = sample.centroids_m.iter();
-        let placed: Vec<_> = placed
-            .map(|point| pose.rotation * point + pose.translation.vector)
-            .collect();
-        self.map.add(&placed);
-        let ranges = sample.centroids_m.iter().map(Vector3::norm);
-        let range_m = ranges.fold(0.0, f64::max);
-        self.map
-            .keep_within(&pose.translation.vector, KEPT_RANGES * range_m);
-        self.added_at = pose;
-        self.scans += 1;
-    }
-}
-
-/// Covariance of one registration; along weak directions that of the prediction.
-fn covariance_of(
-    alignment: &Alignment,
-    weak_m: f64,
-    verdict: &Verdict,
-    arm_m: f64,
-) -> Matrix6<f64> {
-    let unknown = Matrix6::identity() * verdict::MAX_WEAK_M.powi(2);
-    let inverse = alignment.information.try_inverse();
-    let mut covariance = inverse.map_or(unknown, |inverse| inverse * CORRELATION);
-    match verdict {
-        Verdict::Ok => {}
-        Verdict::Weak(directions) => {
-            for weak in directions {
-                covariance += weak.motion * weak.motion.transpose() * (weak_m * weak_m);
-            }
-        }
-        Verdict::Lost(_) => {
-            let turn = (verdict::MAX_WEAK_M / arm_m).powi(2);
-            let spread = Vector6::new(1.0, 1.0, 1.0, turn, turn, turn);
-            covariance = Matrix6::from_diagonal(&spread);
-        }
-    }
-    covariance
-}
-
-/// A weak direction in metres and radians.
-fn direction((part, scaled): &(f64, Vector6<f64>), arm_m: f64) -> WeakDirection {
-    let mut motion = *scaled;
-    let mut turn = motion.fixed_rows_mut::<3>(3);
-    turn /= arm_m;
-    WeakDirection {
-        motion,
-        part: *part,
     }
 }

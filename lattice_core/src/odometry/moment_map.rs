@@ -68,6 +68,15 @@ impl MomentMap {
         }
     }
 
+    /// Lets surfaces be made anew from their cells and those around them. To be called after points have changed.
+    pub(super) fn renew_surfaces(&mut self) {
+        for number in 0..self.cells.len() as u32 {
+            if let Some(cell) = self.cells.row_mut(number) {
+                cell.surface = OnceLock::new();
+            }
+        }
+    }
+
     /// Takes out points that were added, metres.
     pub fn subtract(&mut self, points_m: &[Vector3<f64>]) {
         for point in points_m {
@@ -138,6 +147,25 @@ impl MomentMap {
         }
     }
 
+    /// The surface of a cell, with the points of the cells around it where its own show no plane.
+    fn surface_of(&self, cell: &Cell) -> Surface {
+        let (center, side_m) = (self.lattice.center(cell.index), self.lattice.cell_side_m());
+        let own = Surface::of(&cell.moments, &center, side_m);
+        if own.plane.is_some() {
+            return own;
+        }
+        let mut merged = cell.moments;
+        for step in self.lattice.face_neighbors() {
+            let index = [0, 1, 2].map(|i| cell.index[i].wrapping_add(step[i]));
+            let near = BlockKey::pack(index).and_then(|key| self.cell(key.raw()));
+            if let Some(near) = near {
+                let offset = self.lattice.center(near.index) - center;
+                merged.add(&near.moments.about(&offset), 1);
+            }
+        }
+        own.with_plane_of(&merged, side_m)
+    }
+
     fn cell(&self, code: u64) -> Option<&Cell> {
         self.cells.rows().get(self.cells.find(code)? as usize)
     }
@@ -151,10 +179,7 @@ impl MomentMap {
             let Some(cell) = BlockKey::pack(index).and_then(|key| self.cell(key.raw())) else {
                 return;
             };
-            let surface = cell.surface.get_or_init(|| {
-                let center = self.lattice.center(cell.index);
-                Surface::of(&cell.moments, &center, self.lattice.cell_side_m())
-            });
+            let surface = cell.surface.get_or_init(|| self.surface_of(cell));
             let distance = (surface.mean_m - point).norm_squared();
             if distance < best.0 {
                 best = (distance, Some(surface));

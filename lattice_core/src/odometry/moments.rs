@@ -46,6 +46,26 @@ impl Moments {
         Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) - mean * mean.transpose()
     }
 
+    /// The moments about another place: offsets are longer by `shift_m`, which is rounded to mm.
+    pub(super) fn about(&self, shift_m: &Vector3<f64>) -> Moments {
+        let [x, y, z] = [0, 1, 2].map(|i| (shift_m[i] / UNIT_M).round() as i64);
+        let [a, b, c] = self.sums;
+        let [xx, yy, zz, xy, xz, yz] = self.products;
+        let n = self.count;
+        Moments {
+            count: n,
+            sums: [a + n * x, b + n * y, c + n * z],
+            products: [
+                xx + 2 * a * x + n * x * x,
+                yy + 2 * b * y + n * y * y,
+                zz + 2 * c * z + n * z * z,
+                xy + a * y + b * x + n * x * y,
+                xz + a * z + c * x + n * x * z,
+                yz + b * z + c * y + n * y * z,
+            ],
+        }
+    }
+
     /// The moments with `sign` times those of `other`.
     pub(super) fn add(&mut self, other: &Moments, sign: i64) {
         self.count += sign * other.count;

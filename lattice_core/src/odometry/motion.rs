@@ -58,6 +58,11 @@ impl Motion {
         self.velocity.unwrap_or_else(Vector6::zeros)
     }
 
+    /// True before two scans were registered.
+    pub fn is_unknown(&self) -> bool {
+        self.velocity.is_none()
+    }
+
     /// Motion from the end of a scan to that of the next one.
     pub fn predict(&self, from_ns: i64, to_ns: i64, prior: &Prior) -> Isometry3<f64> {
         if let Some(motion) = prior.motion {

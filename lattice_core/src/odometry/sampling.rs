@@ -11,7 +11,7 @@ use crate::lattice::{Lattice, LatticeError, LatticeKind};
 /// plane needs returns of more than one.
 const SIDE_SPACINGS: f64 = 8.0;
 /// Bounds of the side, metres: below, noise of ranges makes planes thick; above, cells hold several surfaces.
-const SIDES_M: (f64, f64) = (0.2, 1.6);
+const SIDES_M: (f64, f64) = (0.3, 1.0);
 /// Centroids for the map, at least and at most: a cell of the map gets some of each scan.
 const CENTROIDS: (usize, usize) = (3000, 8000);
 /// Points for registration, at least and at most.
@@ -78,7 +78,7 @@ impl Sizes {
                 size
             }
         };
-        let (fine, coarse) = (self.map_m / 2.0, self.map_m * 1.5);
+        let (fine, coarse) = (self.map_m / 2.0, self.map_m * 3.0);
         self.centroids_m = step(self.centroids_m, sample.centroids_m.len(), CENTROIDS, fine);
         self.registered_m = step(
             self.registered_m,

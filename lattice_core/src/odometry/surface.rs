@@ -17,7 +17,7 @@ const ALONG_PLANE: f64 = 0.05;
 #[derive(Clone, Debug)]
 pub(super) struct Plane {
     pub normal: Vector3<f64>,
-    /// Covariance of the normal: for points of thickness `s0` along axes of spread `s1` and `s2`, `s0 / (n s)` along each.
+    /// Covariance of the normal: of a plane fitted to `n` points, `λ0 / ((n - 3) λ)` along each axis in the plane.
     pub tilt: Matrix3<f64>,
 }
 
@@ -37,14 +37,18 @@ impl Surface {
     /// A plane has the information `n nᵀ / (λ0 + ε²)` across. A point that is anywhere in the cell has the variance
     /// `side² / 12` in each axis.
     pub fn of(moments: &Moments, center_m: &Vector3<f64>, side_m: f64) -> Surface {
-        let isotropic = 12.0 / (side_m * side_m);
-        let mut surface = Surface {
+        let own = Surface {
             mean_m: center_m + moments.mean_m(),
-            information: Matrix3::identity() * isotropic,
+            information: Matrix3::identity() * isotropic(side_m),
             plane: None,
         };
+        own.with_plane_of(moments, side_m)
+    }
+
+    /// The surface with the orientation of a plane through points of it and around it, where they lie in one.
+    pub fn with_plane_of(mut self, moments: &Moments, side_m: f64) -> Surface {
         if moments.count() < PLANE_POINTS {
-            return surface;
+            return self;
         }
         let eigen = SymmetricEigen::new(moments.covariance_m2());
         let mut order = [0, 1, 2];
@@ -54,13 +58,18 @@ impl Surface {
         if l0 < PLANE_FLATNESS * l1 {
             let across = 1.0 / (l0 + PLANE_NOISE_M * PLANE_NOISE_M);
             let normal = v0 * v0.transpose();
-            surface.information =
-                normal * across + (Matrix3::identity() - normal) * (ALONG_PLANE * isotropic);
-            let thickness = (l0 + PLANE_NOISE_M * PLANE_NOISE_M) / moments.count() as f64;
+            let along = ALONG_PLANE * isotropic(side_m);
+            self.information = normal * across + (Matrix3::identity() - normal) * along;
+            let thickness = l0 / (moments.count() - 3) as f64;
             let tilt =
                 v1 * v1.transpose() * (thickness / l1) + v2 * v2.transpose() * (thickness / l2);
-            surface.plane = Some(Plane { normal: v0, tilt });
+            self.plane = Some(Plane { normal: v0, tilt });
         }
-        surface
+        self
     }
+}
+
+/// Information of a point that is anywhere in a cell: the variance is `side² / 12` in each axis.
+fn isotropic(side_m: f64) -> f64 {
+    12.0 / (side_m * side_m)
 }

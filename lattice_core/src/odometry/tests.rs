@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use nalgebra::Vector6;
+
 use super::*;
 use crate::pose::se3;
 

@@ -8,13 +8,13 @@ use nalgebra::Vector6;
 const MIN_POINTS: usize = 100;
 /// Part of the points that the map explains below which a pose is lost, absolute and of what is usual in the map.
 const MIN_OVERLAP: f64 = 0.2;
-const MIN_OF_USUAL: f64 = 0.6;
+const MIN_OF_USUAL: f64 = 0.65;
 /// Part of the usual overlap after which a lost scan is found again in the same map.
-const FOUND_OF_USUAL: f64 = 0.85;
+const FOUND_OF_USUAL: f64 = 0.8;
 /// Three standard deviations along weak directions beyond which a pose is lost, metres.
 pub(super) const MAX_WEAK_M: f64 = 1.0;
-/// Part of the registered points whose planes hold a direction, below which it is weak.
-pub(super) const WEAK_PART: f64 = 0.01;
+/// Part of the displacements that a motion makes which planes show, below which it is weak.
+const WEAK_PART: f64 = 0.012;
 
 /// Verdict on the pose of a scan.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +32,7 @@ pub enum Verdict {
 pub struct WeakDirection {
     /// Translation (m) and rotation (rad) of a motion along it.
     pub motion: Vector6<f64>,
-    /// Part of the registered points whose planes hold it.
+    /// Part of the displacement of points that planes show.
     pub part: f64,
 }
 
@@ -89,6 +89,14 @@ pub(super) fn judge(evidence: Evidence) -> Verdict {
         return Verdict::Lost(LostCause::Unobservable);
     }
     Verdict::Weak(evidence.weak)
+}
+
+/// Part of the displacements below which a motion is weak: larger before a lost scan is believed again.
+pub(super) fn weak_part(was_lost: bool) -> f64 {
+    match was_lost {
+        true => 1.5 * WEAK_PART,
+        false => WEAK_PART,
+    }
 }
 
 /// True if a scan can begin a map.

@@ -2,9 +2,13 @@
 //!
 //! [`LidarOdometry`] is a state machine without I/O around [`lattice_core::odometry`].
 
+pub mod node;
 mod options;
+mod parameters;
+mod path;
 
 pub use options::LidarOdometryOptions;
+pub use parameters::declare;
 
 use lattice_core::cloud::{CloudLimits, RangeLimits, transform_points};
 use lattice_core::odometry::{
@@ -20,6 +24,8 @@ use serde::{Deserialize, Serialize};
 use crate::convert::{cloud, geometry};
 use crate::enu_transformer::{CloudNote, CloudNotes, CloudTimes, Refusal, Refusals};
 
+/// Pause between two scans below which the motion between them is that of the scans, ns.
+pub(crate) const PAUSE_NS: i64 = 50_000_000;
 /// Longest time between the stamps of two clouds that is no other clock, in ns.
 const CLOCK_JUMP_NS: i64 = 1_000_000_000;
 
@@ -57,6 +63,23 @@ impl OdometryCounts {
     }
 }
 
+/// The end of a `lidar_odometry`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OdometryReport {
+    /// Everything counted by the state machine.
+    pub counts: OdometryCounts,
+    /// Clouds that found the inbox, or the queue before it, full.
+    pub clouds_inbox_full: u64,
+    /// Clouds that were sent and did not come.
+    pub clouds_lost_on_network: u64,
+    /// Samples that did not decode.
+    pub undecodable: u64,
+    /// Messages refused, by topic and reason, with value and remedy.
+    pub refusals: Vec<Refusal>,
+    /// Notes on clouds read otherwise than declared, and on the source of the times of their points.
+    pub notes: Vec<CloudNote>,
+}
+
 /// Poses of a lidar, scan by scan.
 pub struct LidarOdometry {
     options: LidarOdometryOptions,
@@ -66,6 +89,8 @@ pub struct LidarOdometry {
     refusals: Refusals,
     counts: OdometryCounts,
     last: Option<ScanResult>,
+    /// End of the last scan with a certain pose.
+    certain_ns: Option<i64>,
 }
 
 impl LidarOdometry {
@@ -83,6 +108,7 @@ impl LidarOdometry {
             refusals: Refusals::default(),
             counts: OdometryCounts::default(),
             last: None,
+            certain_ns: None,
             options,
         }
     }
@@ -229,6 +255,21 @@ impl LidarOdometry {
     pub fn message(&self, result: &ScanResult) -> Odometry {
         let (odom, base) = (&self.options.odom_frame, &self.options.base_frame);
         odometry_message(odom, base, result)
+    }
+
+    /// Poses that cover a scan, if its place in the first submap is certain; else none. Clouds between them can be mapped.
+    pub fn certain(&mut self, result: &ScanResult) -> Vec<Odometry> {
+        if result.verdict != Verdict::Ok || result.submap > 0 {
+            return Vec::new();
+        }
+        let before_ns = self.certain_ns.replace(result.end_ns);
+        let follows = |before_ns: i64| result.first_ns.saturating_sub(before_ns) <= PAUSE_NS;
+        let mut poses = Vec::new();
+        if !before_ns.is_some_and(follows) && result.first_ns < result.end_ns {
+            poses.push(self.message(&result.at_first()));
+        }
+        poses.push(self.message(result));
+        poses
     }
 
     /// A pose as a transform.

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::OdometryReport;
+use super::ScanPosesReport;
 use crate::enu_transformer::{Refusal, TransformerReport};
 use crate::lattice_mapper::MapperReport;
 use crate::voxel_marker_publisher::MarkerReport;
@@ -42,7 +42,7 @@ pub struct RunReport {
     pub origin: Option<[f64; 3]>,
     /// Odometry of the scans, where the log has no poses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub odometry: Option<OdometryReport>,
+    pub odometry: Option<ScanPosesReport>,
     /// Rows of the log that are no messages and were left out.
     #[serde(default)]
     pub implausible_rows: u64,
@@ -60,7 +60,7 @@ impl RunReport {
     /// Fails with the cause unless some cloud was mapped in every lattice.
     pub fn check(&self) -> Result<(), NothingMapped> {
         let lost = self.odometry.as_ref();
-        if let Some(cause) = lost.and_then(OdometryReport::cause_of_nothing) {
+        if let Some(cause) = lost.and_then(ScanPosesReport::cause_of_nothing) {
             return Err(NothingMapped { cause });
         }
         let is_empty = |report: &LatticeReport| report.map.voxels == 0;
@@ -97,7 +97,7 @@ impl RunReport {
             + self.transformer.undecodable;
         let arrived = counts.clouds_in + refused;
         let odometry = self.odometry.as_ref();
-        let arrived = arrived + odometry.map_or(0, OdometryReport::left_out);
+        let arrived = arrived + odometry.map_or(0, ScanPosesReport::left_out);
         let missing = self.clouds_in_log.saturating_sub(arrived);
         if missing > 0 {
             let all = self.clouds_in_log;
@@ -105,7 +105,7 @@ impl RunReport {
                 "{missing} of {all} clouds of the log did not reach the transformer"
             ));
         }
-        lines.extend(odometry.into_iter().flat_map(OdometryReport::losses));
+        lines.extend(odometry.into_iter().flat_map(ScanPosesReport::losses));
         for (reason, count) in self.transformer.dropped() {
             lines.push(format!("{count} of {} clouds: {reason}", counts.clouds_in));
         }

@@ -14,15 +14,12 @@ use super::plan::TopicPlan;
 use super::topics::{Role, TopicError};
 use crate::enu_transformer::Refusal;
 use crate::lidar_odometry::{
-    LidarOdometry, LidarOdometryOptions, OdometryCounts, odometry_message,
+    LidarOdometry, LidarOdometryOptions, OdometryCounts, PAUSE_NS, odometry_message,
 };
-
-/// Pause between two scans below which the motion between them is that of the scans, ns.
-const PAUSE_NS: i64 = 50_000_000;
 
 /// Odometry of a replay.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct OdometryReport {
+pub struct ScanPosesReport {
     /// Topic of the clouds.
     pub topic: String,
     /// Scans by verdict, and length of the path.
@@ -35,7 +32,7 @@ pub struct OdometryReport {
     pub refusals: Vec<Refusal>,
 }
 
-impl OdometryReport {
+impl ScanPosesReport {
     /// One line per loss.
     pub(super) fn losses(&self) -> Vec<String> {
         let counts = &self.counts;
@@ -89,7 +86,7 @@ impl OdometryReport {
     }
 }
 
-impl std::fmt::Display for OdometryReport {
+impl std::fmt::Display for ScanPosesReport {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let counts = &self.counts;
         write!(
@@ -115,7 +112,7 @@ pub(super) struct ScanPoses {
     /// The submap with the most scans that are `OK`.
     mapped: u32,
     pub topic: usize,
-    pub report: OdometryReport,
+    pub report: ScanPosesReport,
 }
 
 impl ScanPoses {
@@ -165,7 +162,7 @@ impl ScanPoses {
         let best = in_submaps.iter().rev().max_by_key(|(_, count)| **count);
         let (mapped, scans_mapped) = best.map_or((0, 0), |(submap, count)| (*submap, *count));
         Ok(Self {
-            report: OdometryReport {
+            report: ScanPosesReport {
                 topic: name.to_owned(),
                 counts: machine.counts().clone(),
                 scans_mapped,
@@ -193,14 +190,7 @@ impl ScanPoses {
         if let Some(before) = before.filter(follows) {
             poses.insert(0, self.message(before));
         } else if scan.first_ns < scan.end_ns {
-            poses.insert(
-                0,
-                self.message(&ScanResult {
-                    end_ns: scan.first_ns,
-                    odom_from_base: scan.odom_from_first,
-                    ..scan.clone()
-                }),
-            );
+            poses.insert(0, self.message(&scan.at_first()));
         }
         Some(poses)
     }

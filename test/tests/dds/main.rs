@@ -11,6 +11,7 @@ mod losses;
 mod machines;
 mod network;
 mod octomap;
+mod odometry;
 mod params;
 mod rclpy;
 mod rgbd;
