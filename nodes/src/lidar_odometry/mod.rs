@@ -10,7 +10,7 @@ mod path;
 pub use options::LidarOdometryOptions;
 pub use parameters::declare;
 
-use lattice_core::cloud::{CloudLimits, RangeLimits, transform_points};
+use lattice_core::cloud::CloudLimits;
 use lattice_core::odometry::{
     LostCause, Odometry as Core, OdometryOptions, Prior, Scan, ScanResult, Verdict,
 };
@@ -19,6 +19,7 @@ use lattice_msgs::geometry_msgs::{PoseWithCovariance, TransformStamped};
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
+use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::convert::{cloud, geometry};
@@ -189,22 +190,23 @@ impl LidarOdometry {
         let layout = cloud::layout_of(message);
         let view = (layout.view(&message.data, &CloudLimits { max_points }))
             .map_err(|error| malformed(&error))?;
-        let range = RangeLimits {
-            min_range_m: options.min_range_m,
-            max_range_m: options.max_range_m,
+        let range_m = options.min_range_m..=options.max_range_m;
+        let is_kept = |p: &Vector3<f64>| {
+            let distance_m = p.norm();
+            // At the lower end are points in the sensor's own origin, by which many drivers say that there is no return.
+            distance_m.is_finite() && range_m.contains(&distance_m) && distance_m > *range_m.start()
         };
-        let moved = transform_points(&view, times.stamp_ns, None, &range, |_| {
-            Ok::<_, std::convert::Infallible>(mount)
-        });
-        let moved = moved.map_err(|error| malformed(&error))?;
-        let mut left_out = moved.left_out.iter().copied().peekable();
-        let is_kept = |i: &usize| left_out.next_if_eq(i).is_none();
+        let points = (0..view.len()).map(|i| (i, view.xyz(i)));
+        let (kept, points_m): (Vec<usize>, Vec<Vector3<f64>>) = points
+            .filter(|(_, p)| is_kept(p))
+            .map(|(i, p)| (i, (mount * Point3::from(p)).coords))
+            .unzip();
         let times_ns: Option<Vec<i64>> = times.times_ns.as_ref().map(|times| {
-            let kept = (0..times.len()).filter(is_kept);
-            kept.filter_map(|i| times.get(i).copied()).collect()
+            let of_kept = kept.iter().filter_map(|i| times.get(*i));
+            of_kept.copied().collect()
         });
         let scan = Scan {
-            points_m: &moved.points_m,
+            points_m: &points_m,
             times_ns: times_ns.as_deref(),
             stamp_ns: times.stamp_ns,
         };
