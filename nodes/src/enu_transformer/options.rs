@@ -226,8 +226,7 @@ fn correction(params: &Params) -> Result<Option<Isometry3<f64>>, ParamError> {
     Ok(Some(correction).filter(|correction| *correction != Isometry3::identity()))
 }
 
-/// `time.*`: field, unit and reference of the times of points.
-pub(crate) fn time_options(params: &Params) -> Result<TimeOptions, ParamError> {
+fn time_options(params: &Params) -> Result<TimeOptions, ParamError> {
     let field = params.string("time.field", "")?;
     let units = [
         ("auto", None),

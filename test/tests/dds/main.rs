@@ -13,7 +13,6 @@ mod machines;
 mod markers;
 mod network;
 mod octomap;
-mod odometry;
 mod params;
 mod rclpy;
 mod rgbd;
