@@ -194,7 +194,7 @@ fn draw(clouds: usize, chunk_bytes: usize, stop: bool) {
             .unwrap();
         // The rate of the sensor.
         thread::sleep(CLOUD_PERIOD);
-        if stop && number == clouds / 3 {
+        if stop && number == clouds / 6 {
             viewers.iter().for_each(|viewer| viewer.signal("-STOP"));
             stopped = Some(Instant::now());
         }

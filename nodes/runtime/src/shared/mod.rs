@@ -7,7 +7,7 @@ mod serving;
 mod status;
 mod subscribing;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, Weak};
 use std::thread::JoinHandle;
@@ -77,6 +77,8 @@ struct Open {
     _watch: Option<Task<()>>,
     publishers: Vec<Weak<PublisherParts>>,
     intakes: Vec<Weak<Intake>>,
+    /// Topics and counts of subscriptions, also of those that have ended.
+    subscribed: VecDeque<(String, Arc<Stats>)>,
     readers: Vec<(Sender<()>, JoinHandle<()>)>,
     servers: Vec<Server>,
     unanswered: Vec<Weak<Unanswered>>,
@@ -112,6 +114,7 @@ impl Shared {
                 _watch: watch,
                 publishers: Vec::new(),
                 intakes: Vec::new(),
+                subscribed: VecDeque::new(),
                 readers: Vec::new(),
                 servers: Vec::new(),
                 unanswered: Vec::new(),
@@ -244,6 +247,13 @@ impl Shared {
         let open = lock(&self.open);
         let all = open.iter().flat_map(|open| &open.intakes);
         all.filter_map(Weak::upgrade).collect()
+    }
+
+    /// Counts of the last subscriptions, by topic, also of those that have ended.
+    fn subscribed(&self) -> Vec<(String, Arc<Stats>)> {
+        let open = lock(&self.open);
+        let all = open.iter().flat_map(|open| &open.subscribed);
+        all.cloned().collect()
     }
 
     /// Requests that came to nothing, of all servers.

@@ -10,6 +10,7 @@ use super::Shared;
 use crate::diagnostics::{Level, status};
 use crate::env::TransportKind;
 use crate::port::{RECEIVE_BUFFER_BYTES, ReaderLosses};
+use crate::subscription::Stats;
 use crate::sync::lock;
 
 /// Below this, bursts of large messages are lost; twice the largest message is needed.
@@ -59,7 +60,7 @@ fn granted_receive_buffer(bytes: usize) -> Option<usize> {
 const QOS: &str = "QoS does not match";
 
 /// Losses kept, at most.
-const MAX_LOSSES: usize = 1000;
+pub(super) const MAX_LOSSES: usize = 1000;
 
 /// Something that went wrong between this process and another.
 struct Trouble {
@@ -68,6 +69,34 @@ struct Trouble {
     count: u64,
     /// The same for every topic.
     problem: &'static str,
+}
+
+impl Trouble {
+    /// `None` if there was none.
+    fn of(topic: &str, what: &str, count: u64, problem: &'static str) -> Option<Self> {
+        let of = || format!("{topic} {what}");
+        (count > 0).then(|| Self {
+            of: of(),
+            count,
+            problem,
+        })
+    }
+}
+
+/// Messages that a subscription did not have.
+fn not_had(topic: &str, stats: &Stats) -> Vec<Trouble> {
+    let ReaderLosses {
+        on_network,
+        overrun,
+    } = &stats.losses;
+    let counts = [
+        ("undecodable", &stats.undecodable, "undecodable samples"),
+        ("lost_on_network", on_network, "messages lost"),
+        ("overrun", overrun, "messages lost"),
+    ];
+    let troubles =
+        counts.map(|(what, count, problem)| Trouble::of(topic, what, count.load(Relaxed), problem));
+    troubles.into_iter().flatten().collect()
 }
 
 impl Shared {
@@ -101,9 +130,12 @@ impl Shared {
         status(node, "transport", level, message, values)
     }
 
-    /// Messages and requests lost so far, by topic, of endpoints that have ended as of the last status.
+    /// Messages and requests lost so far, by topic; of publishers and servers that have ended as of the last status.
     pub(crate) fn losses(&self) -> Vec<(String, u64)> {
         self.note_losses(&self.troubles());
+        for (topic, stats) in self.subscribed() {
+            self.note_losses(&not_had(&topic, &stats));
+        }
         lock(&self.losses).clone().into_iter().collect()
     }
 
@@ -120,38 +152,34 @@ impl Shared {
     /// Everything that was lost or does not match, with its count.
     fn troubles(&self) -> Vec<Trouble> {
         let mut troubles = Vec::new();
-        let mut add = |topic: &str, what: &str, count: u64, problem: &'static str| {
-            if count > 0 {
-                let of = format!("{topic} {what}");
-                troubles.push(Trouble { of, count, problem });
-            }
-        };
         for publisher in self.publishers() {
             let topic = publisher.peers.topic();
             let dropped = publisher.writer.dropped();
-            add(topic, "dropped", dropped, "messages dropped");
+            troubles.extend(Trouble::of(topic, "dropped", dropped, "messages dropped"));
             let incompatible = publisher.peers.incompatible_count() as u64;
-            add(topic, "incompatible_subscribers", incompatible, QOS);
+            troubles.extend(Trouble::of(
+                topic,
+                "incompatible_subscribers",
+                incompatible,
+                QOS,
+            ));
         }
         for intake in self.intakes() {
-            let (topic, stats) = (&intake.topic, &intake.stats);
-            let undecodable = stats.undecodable.load(Relaxed);
-            add(topic, "undecodable", undecodable, "undecodable samples");
-            let ReaderLosses {
-                on_network,
-                overrun,
-            } = &stats.losses;
-            let on_network = on_network.load(Relaxed);
-            add(topic, "lost_on_network", on_network, "messages lost");
-            add(topic, "overrun", overrun.load(Relaxed), "messages lost");
+            let topic = &intake.topic;
+            troubles.extend(not_had(topic, &intake.stats));
             let incompatible = intake.peers.incompatible_count() as u64;
-            add(topic, "incompatible_publishers", incompatible, QOS);
+            troubles.extend(Trouble::of(
+                topic,
+                "incompatible_publishers",
+                incompatible,
+                QOS,
+            ));
         }
         const REQUESTS: &str = "requests not answered";
         for of in self.unanswered() {
             let (lost, failed) = (of.lost.load(Relaxed), of.failed.load(Relaxed));
-            add(&of.name, "requests_lost", lost, REQUESTS);
-            add(&of.name, "requests_failed", failed, REQUESTS);
+            troubles.extend(Trouble::of(&of.name, "requests_lost", lost, REQUESTS));
+            troubles.extend(Trouble::of(&of.name, "requests_failed", failed, REQUESTS));
         }
         troubles
     }

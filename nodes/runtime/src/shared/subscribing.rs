@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicU64;
 use lattice_msgs::RosMessage;
 use smol::channel::{Sender, bounded, unbounded};
 
+use super::status::MAX_LOSSES;
 use super::{Shared, closed};
 use crate::error::RuntimeError;
 use crate::graph::NodeId;
@@ -138,6 +139,11 @@ impl Shared {
         if let Some(open) = lock(&self.open).as_mut() {
             open.intakes.retain(|intake| intake.strong_count() > 0);
             open.intakes.push(Arc::downgrade(&intake));
+            let counts = (intake.topic.clone(), Arc::clone(&intake.stats));
+            open.subscribed.push_back(counts);
+            if open.subscribed.len() > MAX_LOSSES {
+                open.subscribed.pop_front();
+            }
         }
         self.endpoints.register(id, &peers);
         Ok(Subscription {
