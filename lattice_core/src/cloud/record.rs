@@ -24,9 +24,14 @@ impl Precision {
     /// Single precision where it rounds a point by less than 0.5 mm, else double.
     #[inline]
     pub fn for_point(point_m: &Vector3<f64>) -> Self {
-        match point_m.iter().all(|v| v.abs() < SINGLE_REACH_M) {
-            true => Self::Float32,
-            false => Self::Float64,
+        Self::of(!point_m.iter().all(|v| v.abs() < SINGLE_REACH_M))
+    }
+
+    #[inline]
+    pub(super) fn of(is_double: bool) -> Self {
+        match is_double {
+            true => Self::Float64,
+            false => Self::Float32,
         }
     }
 

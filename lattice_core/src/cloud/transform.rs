@@ -127,8 +127,11 @@ where
         if let Some(precision) = format.precision {
             return write(precision).map(|(records, _)| records);
         }
-        // The place of the sensor foretells in all but rare clouds whether some point needs double precision.
-        let first = known(0).map(|pose| Precision::for_point(&pose.translation.vector));
+        // The position of the sensor foretells in all but rare clouds whether some point needs double precision.
+        let pose = known(0)
+            .copied()
+            .or_else(|| (self.lookup)(0).ok().flatten());
+        let first = pose.map(|pose| Precision::for_point(&pose.translation.vector));
         let first = first.unwrap_or(Precision::Float32);
         let (records, needed) = write(first)?;
         if needed == first {
@@ -177,21 +180,12 @@ where
         let records = Records {
             data,
             points: all.kept,
-            precision: if IS_WIDE {
-                Precision::Float64
-            } else {
-                Precision::Float32
-            },
+            precision: Precision::of(IS_WIDE),
             not_finite: all.not_finite,
             out_of_range: all.out_of_range,
             no_time: all.no_time,
         };
-        let needed = if all.is_far {
-            Precision::Float64
-        } else {
-            Precision::Float32
-        };
-        Ok((records, needed))
+        Ok((records, Precision::of(all.is_far)))
     }
 
     /// Writes the records of the points from `first` on to `out`, which has room for all of them.

@@ -74,9 +74,8 @@ struct Trouble {
 impl Trouble {
     /// `None` if there was none.
     fn of(topic: &str, what: &str, count: u64, problem: &'static str) -> Option<Self> {
-        let of = || format!("{topic} {what}");
         (count > 0).then(|| Self {
-            of: of(),
+            of: format!("{topic} {what}"),
             count,
             problem,
         })
