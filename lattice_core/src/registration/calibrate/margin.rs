@@ -61,7 +61,7 @@ impl Margin {
     /// Probability that the pose is wrong, and another one right.
     ///
     /// Odds fall with the square of the margin, but no more than what chance does not make speaks for; the constants
-    /// are fitted to simulated scenes and a room, see `docs/decisions/0024-p-wrong.md`.
+    /// are fitted to simulated scenes and a room, see `docs/calibration.md`.
     pub fn p_wrong(&self) -> f64 {
         1.0 / (1.0 + (self.against() - self.without()).exp())
     }
