@@ -180,13 +180,13 @@ fn shown(path: &Path) -> String {
     path.strip_prefix(root()).unwrap().display().to_string()
 }
 
-/// Sentences of a page that are too long, with their places.
+/// Sentences of a page that are too long, with their places; a quotation counts as a word.
 fn long_sentences(page: &Path) -> Vec<String> {
     let text = fs::read_to_string(page).unwrap();
     let prose = parts(&text).into_iter().filter(|part| part.is_prose);
     let mut found = Vec::new();
     for part in prose {
-        let plain = plain(&part.text);
+        let plain = unquoted(&plain(&part.text));
         let long = sentences(&plain).into_iter();
         let long = long.filter(|sentence| words(sentence) > LONGEST_SENTENCE);
         found.extend(long.map(|text| format!("{}:{}: {text}", shown(page), part.line)));
