@@ -4,7 +4,7 @@ use std::fs;
 
 use super::root;
 
-const PAGES: [&str; 2] = ["docs/architecture.md", "CONTRIBUTING.md"];
+const PAGES: [&str; 2] = ["docs/dev/architecture.md", "CONTRIBUTING.md"];
 
 /// Texts in backticks of a line.
 fn quoted(line: &str) -> Vec<&str> {

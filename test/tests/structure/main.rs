@@ -9,6 +9,7 @@ mod params;
 mod security;
 mod source;
 mod supply;
+mod words;
 
 use std::path::Path;
 

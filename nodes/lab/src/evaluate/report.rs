@@ -19,7 +19,7 @@ pub fn report(summary: &Summary, trials: &[Trial]) -> Result<Report, AnyError> {
     };
     let lead = format!(
         "{} results; map cells of {} m, {} surveys of {} views, {} picture(s) of the headset{part}; {}. \
-         docs/calibration.md says how it is done. A pose is right within 0.15 m and 3 degrees; q is the \
+         docs/dev/calibration.md says how it is done. A pose is right within 0.15 m and 3 degrees; q is the \
          share of the view whose objects are labelled wrongly in the map or in the headset. \
          Brackets are 95 % intervals (Wilson).",
         summary.trials,

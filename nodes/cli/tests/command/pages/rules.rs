@@ -91,7 +91,7 @@ pub const RULES: &[(&str, &str, Rule)] = &[
         "lattice calibrate",
         NotHere("calibrate.rs"),
     ),
-    ("docs/calibration.md", "lattice simulate town", Runs("")),
+    ("docs/dev/calibration.md", "lattice simulate town", Runs("")),
     ("docs/commands.md", "lattice", Runs("")),
     (
         "docs/free_space.md",

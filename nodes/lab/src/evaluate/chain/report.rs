@@ -14,7 +14,7 @@ pub fn chain_report(trials: &[Trial]) -> Report {
     let title = "From images to a verdict, with a network";
     let lead = format!(
         "Rendered rooms, labelled by the network, calibrated without a start; right is within {} m and {} degrees. \
-         Goals: at least {} % OK, at most {} % of the OK wrong. Intervals are of 95 % (Wilson). docs/calibration.md says \
+         Goals: at least {} % OK, at most {} % of the OK wrong. Intervals are of 95 % (Wilson). docs/dev/calibration.md says \
          how it is made.",
         WRONG.m, WRONG.deg, GOALS[0], GOALS[1]
     );

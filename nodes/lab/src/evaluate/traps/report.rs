@@ -12,7 +12,7 @@ const LISTED: usize = 40;
 pub fn traps_report(trials: &[Trial]) -> Report {
     let lead = format!(
         "{} calibrations without a start that must not be certain of a wrong pose: beyond {} m or {} degrees. \
-         docs/calibration.md says how the scenes are made.",
+         docs/dev/calibration.md says how the scenes are made.",
         trials.len(),
         WRONG.m,
         WRONG.deg
