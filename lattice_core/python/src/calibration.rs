@@ -1,7 +1,7 @@
 //! `calibrate`.
 
 use lattice_core::registration::{
-    CalibrationMap, CalibrationRequest, HeadsetScan, LabelDistribution, Profile, SemanticCloud,
+    CalibrationMap, CalibrationRequest, SourceCloud, LabelDistribution, Profile, SemanticCloud,
     calibrate as search,
 };
 use nalgebra::Point3;
@@ -107,12 +107,12 @@ pub fn calibrate(
         on_pool(|| {
             let map = CalibrationMap::new(map, side_m);
             let map = map.map_err(|error| refuse(format!("map: {error}")))?;
-            let scans = [HeadsetScan {
+            let scans = [SourceCloud {
                 cloud,
                 sensor_m: sensor.map(Point3::from),
             }];
             let request = CalibrationRequest {
-                headset_scans: &scans,
+                source_clouds: &scans,
                 start,
                 confusion: None,
             };

@@ -17,7 +17,7 @@ mod solver;
 pub use crate::kd_tree::{MAX_NEIGHBORS, Neighbors};
 pub use calibrate::{
     AbsoluteFit, Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest,
-    ClassReliability, DirectionKind, HeadsetScan, Margin, Profile, Progress, ScaleEstimate, Stage,
+    ClassReliability, DirectionKind, Margin, Profile, Progress, ScaleEstimate, SourceCloud, Stage,
     TrackUpdate, Unexplained, UnexplainedKind, Verdict, WeakDirection, calibrate, p_wrong_in_words,
     track,
 };

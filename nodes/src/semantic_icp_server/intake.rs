@@ -52,7 +52,7 @@ impl SemanticIcpServer {
         out
     }
 
-    fn read(&mut self, message: &PointCloud2) -> Result<HeadsetScan, Refusal> {
+    fn read(&mut self, message: &PointCloud2) -> Result<SourceCloud, Refusal> {
         let found = message.header.frame_id.trim_start_matches('/');
         if found != self.options.headset_frame {
             return Err(Refusal::Frame {

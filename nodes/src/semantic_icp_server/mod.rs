@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use lattice_core::registration::{Calibration, HeadsetScan, Stage, TrackUpdate, Verdict};
+use lattice_core::registration::{Calibration, SourceCloud, Stage, TrackUpdate, Verdict};
 use lattice_msgs::calibration::{
     CalibrateFeedback, CalibrateGoal, CalibrateResult, CalibrationResult,
 };
@@ -90,7 +90,7 @@ pub struct SemanticIcpServer {
     /// A cloud came that no search has used.
     fresh_cloud: bool,
     /// The newest cloud that the known pose is still to be refined by, and its stamp.
-    look: Option<(Arc<HeadsetScan>, i64)>,
+    look: Option<(Arc<SourceCloud>, i64)>,
     next_job: u64,
     /// Confusions of labels learned so far are of another session, segmenter or map.
     unlearn: bool,

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationRequest, Confusion, HeadsetScan, Profile, Progress,
-    SemanticCloud, Stage, TrackUpdate, Verdict, calibrate, track,
+    Calibration, CalibrationMap, CalibrationRequest, Confusion, Profile, Progress, SemanticCloud,
+    SourceCloud, Stage, TrackUpdate, Verdict, calibrate, track,
 };
 use lattice_runtime::lock;
 use nalgebra::Isometry3;
@@ -33,7 +33,7 @@ pub trait Search: Send + 'static {
     /// Searches the map.
     fn calibrate(
         &mut self,
-        headset_scans: &[HeadsetScan],
+        headset_scans: &[SourceCloud],
         start: Option<Isometry3<f64>>,
         progress: &dyn Progress,
     ) -> Calibration;
@@ -41,7 +41,7 @@ pub trait Search: Send + 'static {
     /// Refines `map_from_headset` by a look; `None` without a map.
     fn track(
         &mut self,
-        headset_scan: &HeadsetScan,
+        headset_scan: &SourceCloud,
         map_from_headset: &Isometry3<f64>,
     ) -> Option<TrackUpdate>;
 }
@@ -87,7 +87,7 @@ impl Search for LatticeSearch {
 
     fn calibrate(
         &mut self,
-        headset_scans: &[HeadsetScan],
+        headset_scans: &[SourceCloud],
         start: Option<Isometry3<f64>>,
         progress: &dyn Progress,
     ) -> Calibration {
@@ -95,7 +95,7 @@ impl Search for LatticeSearch {
             return Calibration::refused(Verdict::RejectedInput, "there is no map yet");
         };
         let request = CalibrationRequest {
-            headset_scans,
+            source_clouds: headset_scans,
             start,
             confusion: self.confusion.as_ref(),
         };
@@ -114,7 +114,7 @@ impl Search for LatticeSearch {
 
     fn track(
         &mut self,
-        headset_scan: &HeadsetScan,
+        headset_scan: &SourceCloud,
         map_from_headset: &Isometry3<f64>,
     ) -> Option<TrackUpdate> {
         let map = self.map.as_ref()?;
@@ -129,14 +129,14 @@ pub enum Work {
     /// A pose by several looks, near a start if there is one.
     Calibrate {
         /// The looks.
-        headset_scans: Vec<Arc<HeadsetScan>>,
+        headset_scans: Vec<Arc<SourceCloud>>,
         /// `map_from_headset`, about.
         start: Option<Isometry3<f64>>,
     },
     /// The known pose by one more look.
     Track {
         /// The look.
-        headset_scan: Arc<HeadsetScan>,
+        headset_scan: Arc<SourceCloud>,
         /// The pose.
         map_from_headset: Isometry3<f64>,
     },
@@ -203,7 +203,7 @@ impl Job {
                 headset_scans,
                 start,
             } => {
-                let headset_scans: Vec<HeadsetScan> = headset_scans
+                let headset_scans: Vec<SourceCloud> = headset_scans
                     .into_iter()
                     .map(Arc::unwrap_or_clone)
                     .collect();

@@ -28,7 +28,7 @@ pub(super) struct Running {
     pub begun_ns: i64,
     pub stamp_ns: i64,
     /// Looks of a search; of tracking the one look.
-    pub headset_scans: Vec<Arc<HeadsetScan>>,
+    pub headset_scans: Vec<Arc<SourceCloud>>,
     pub tracking: bool,
     /// Of a search with a look that fits the known pose, yet less than it should: how it fits.
     pub doubted: Option<TrackUpdate>,

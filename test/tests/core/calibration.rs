@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan,
-    LabelDistribution, Progress, SemanticCloud, Stage, Verdict, calibrate, track,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, LabelDistribution,
+    Progress, SemanticCloud, SourceCloud, Stage, Verdict, calibrate, track,
 };
 use lattice_lab::simulate::rooms::{Flat, LOOKS};
 use lattice_test::random::Random;
@@ -20,10 +20,10 @@ fn distance(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
 }
 
 /// A scan from one of the places to look from.
-fn scan(flat: &Flat, look: usize, map_from_headset: &Isometry3<f64>) -> HeadsetScan {
+fn scan(flat: &Flat, look: usize, map_from_headset: &Isometry3<f64>) -> SourceCloud {
     let (eye, yaw) = LOOKS[look];
     let eye = Point3::from(eye);
-    HeadsetScan {
+    SourceCloud {
         cloud: flat.look(eye, yaw, map_from_headset),
         sensor_m: Some(map_from_headset.inverse() * eye),
     }
@@ -41,11 +41,11 @@ fn truth(seed: u64) -> Isometry3<f64> {
 
 fn ask(
     map: &CalibrationMap,
-    headset_scans: &[HeadsetScan],
+    headset_scans: &[SourceCloud],
     start: Option<Isometry3<f64>>,
 ) -> Calibration {
     let request = CalibrationRequest {
-        headset_scans,
+        source_clouds: headset_scans,
         start,
         confusion: None,
     };
@@ -141,12 +141,12 @@ fn what_cannot_be_used_is_refused_with_a_reason() {
 }
 
 /// The points of a look for which something is so.
-fn seen(scan: HeadsetScan, is_so: impl Fn(&Point3<f64>, Option<u16>) -> bool) -> HeadsetScan {
-    let HeadsetScan { cloud, sensor_m } = scan;
+fn seen(scan: SourceCloud, is_so: impl Fn(&Point3<f64>, Option<u16>) -> bool) -> SourceCloud {
+    let SourceCloud { cloud, sensor_m } = scan;
     let all = cloud.points_m.into_iter().zip(cloud.labels);
     let (points_m, labels) = all.filter(|(p, l)| is_so(p, l.top())).unzip();
     let cloud = SemanticCloud { points_m, labels };
-    HeadsetScan { cloud, sensor_m }
+    SourceCloud { cloud, sensor_m }
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn it_can_be_ended() {
     }
     let flat = Flat::default();
     let request = CalibrationRequest {
-        headset_scans: &[scan(&flat, 0, &truth(3))],
+        source_clouds: &[scan(&flat, 0, &truth(3))],
         start: None,
         confusion: None,
     };
@@ -206,6 +206,6 @@ fn a_tracked_pose_follows_and_breaks() {
     let elsewhere = scan(&flat, 1, &Isometry3::translation(50.0, 0.0, 9.0));
     let lost = track(&map, &elsewhere, &truth, &options);
     assert!(!lost.fits && lost.map_from_headset == truth);
-    let unusable = track(&map, &HeadsetScan::default(), &truth, &options);
+    let unusable = track(&map, &SourceCloud::default(), &truth, &options);
     assert!(!unusable.fits && unusable.map_from_headset == truth);
 }

@@ -2,7 +2,7 @@
 
 use lattice_core::pose::Axes;
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan, Verdict,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, SourceCloud, Verdict,
     calibrate,
 };
 use lattice_lab::simulate::rooms::{Flat, LOOKS};
@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 struct Scene {
     map: CalibrationMap,
-    scan: HeadsetScan,
+    scan: SourceCloud,
     truth: Isometry3<f64>,
 }
 
@@ -26,7 +26,7 @@ impl Scene {
             cloud.labels.clear();
         }
         let sensor_m = Some(truth.inverse() * eye);
-        let scan = HeadsetScan { cloud, sensor_m };
+        let scan = SourceCloud { cloud, sensor_m };
         Scene { map, scan, truth }
     }
 
@@ -40,7 +40,7 @@ impl Scene {
         let points = scan.cloud.points_m.iter_mut().chain(&mut scan.sensor_m);
         points.for_each(|p| p.coords = change(p.coords));
         let request = CalibrationRequest {
-            headset_scans: &[scan],
+            source_clouds: &[scan],
             start: None,
             confusion: None,
         };

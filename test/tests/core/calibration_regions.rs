@@ -1,7 +1,7 @@
 //! Parts of a view that the map does not explain: what is new in the room, and what is gone.
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, SourceCloud,
     UnexplainedKind, Verdict, calibrate,
 };
 use lattice_lab::simulate::rooms::{Flat, LOOKS};
@@ -30,13 +30,13 @@ fn ask_by(
     let truth = Isometry3::new(Vector3::new(2.0, 4.0, 1.5), Vector3::z() * 2.5);
     let (eye, yaw) = LOOKS[0];
     let eye = Point3::from(eye);
-    let scan = HeadsetScan {
+    let scan = SourceCloud {
         cloud: seen.look(eye, yaw, &truth),
         sensor_m: Some(truth.inverse() * eye),
     };
     let map = CalibrationMap::new(mapped.map(), 0.05).unwrap();
     let request = CalibrationRequest {
-        headset_scans: &[scan],
+        source_clouds: &[scan],
         start: None,
         confusion: None,
     };

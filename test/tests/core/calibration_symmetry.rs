@@ -23,7 +23,7 @@ fn ask(room: &Flat, reach_m: [f64; 2], seed: u64) -> (Calibration, f64) {
     let mut scan = room.all_around(eye, &truth, &mut || random.unit());
     scan.cloud.labels.clear();
     let request = CalibrationRequest {
-        headset_scans: &[scan.clone()],
+        source_clouds: &[scan.clone()],
         start: None,
         confusion: None,
     };

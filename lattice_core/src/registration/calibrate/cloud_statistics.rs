@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use rustc_hash::FxHashMap;
 
 use super::super::likelihood::quantile;
-use super::types::HeadsetScan;
+use super::types::SourceCloud;
 
 /// Points that are looked at, at most; of more, some.
 const POINTS: usize = 200_000;
@@ -39,7 +39,7 @@ struct Cell {
 
 impl CloudStatistics {
     /// Of clouds, each seen from its own sensor.
-    pub fn of(scans: &[HeadsetScan]) -> CloudStatistics {
+    pub fn of(scans: &[SourceCloud]) -> CloudStatistics {
         let all: usize = scans.iter().map(|scan| scan.cloud.len()).sum();
         let stride = all.div_ceil(POINTS).max(1);
         let (mut distances_m, mut counts, mut noises_m) = (Vec::new(), Vec::new(), Vec::new());
@@ -58,7 +58,7 @@ impl CloudStatistics {
     }
 }
 
-fn cells(scan: &HeadsetScan, stride: usize) -> Vec<Cell> {
+fn cells(scan: &SourceCloud, stride: usize) -> Vec<Cell> {
     let usable = |p: &&Point3<f64>| p.iter().all(|c| c.abs() <= FARTHEST_M);
     let points = || scan.cloud.points_m.iter().step_by(stride).filter(usable);
     let sum = points().fold(Vector3::zeros(), |sum, p| sum + p.coords);
@@ -97,7 +97,7 @@ mod tests {
     use crate::registration::SemanticCloud;
 
     /// A floor of 2 m by 2 m below a sensor, a point each centimetre, every other moved up by `noise_m`.
-    fn floor(noise_m: f64) -> HeadsetScan {
+    fn floor(noise_m: f64) -> SourceCloud {
         let places = (0..200).flat_map(|x| (0..200).map(move |y| (x, y)));
         let point = |(x, y): (i32, i32)| {
             let up_m = noise_m * f64::from((x + y) % 2);
@@ -107,7 +107,7 @@ mod tests {
                 up_m + 0.05,
             )
         };
-        HeadsetScan {
+        SourceCloud {
             cloud: SemanticCloud::unlabelled(places.map(point).collect()),
             sensor_m: Some(Point3::new(0.0, 0.0, 1.5)),
         }

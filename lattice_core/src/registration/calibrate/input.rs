@@ -26,23 +26,23 @@ impl Input {
         spacing_m: f64,
     ) -> Result<Input, Refusal> {
         let rejected = Refusal::Input;
-        let n: usize = request.headset_scans.iter().map(|g| g.cloud.len()).sum();
+        let n: usize = request.source_clouds.iter().map(|g| g.cloud.len()).sum();
         if n > options.max_points {
             let most = options.max_points;
             return Err(rejected(format!("{n} points, at most {most} are taken")));
         }
         let mut all = SemanticCloud::default();
-        let labelled = (request.headset_scans.iter()).any(|g| !g.cloud.labels.is_empty());
-        for headset_scan in request.headset_scans {
-            if ![0, headset_scan.cloud.len()].contains(&headset_scan.cloud.labels.len()) {
+        let labelled = (request.source_clouds.iter()).any(|g| !g.cloud.labels.is_empty());
+        for source_cloud in request.source_clouds {
+            if ![0, source_cloud.cloud.len()].contains(&source_cloud.cloud.labels.len()) {
                 return Err(rejected("labels are not as many as points".into()));
             }
-            for (i, point) in headset_scan.cloud.points_m.iter().enumerate() {
+            for (i, point) in source_cloud.cloud.points_m.iter().enumerate() {
                 // NaN fails this too.
                 if point.iter().all(|c| c.abs() <= MAX_RANGE_M) {
                     all.points_m.push(*point);
                     if labelled {
-                        all.labels.push(headset_scan.cloud.label(i));
+                        all.labels.push(source_cloud.cloud.label(i));
                     }
                 }
             }
@@ -59,7 +59,7 @@ impl Input {
         let full = thinned_to(&all, spacing_m, options.registered_points);
         let few = thinned_to(&full, 2.0 * spacing_m, options.registered_points / 8);
         let sensors: Vec<Point3<f64>> = request
-            .headset_scans
+            .source_clouds
             .iter()
             .filter_map(|g| g.sensor_m)
             .collect();
@@ -77,7 +77,7 @@ impl Input {
         Ok(Input {
             full,
             few,
-            sensor_m: match (sensors.as_slice(), request.headset_scans.len()) {
+            sensor_m: match (sensors.as_slice(), request.source_clouds.len()) {
                 ([sensor], 1) if sensor.iter().all(|c| c.abs() <= MAX_RANGE_M) => Some(*sensor),
                 _ => None,
             },

@@ -40,8 +40,8 @@ pub use profile::Profile;
 pub use regions::{AbsoluteFit, Unexplained, UnexplainedKind};
 pub use track::{TrackUpdate, track};
 pub use types::{
-    Calibration, CalibrationOptions, CalibrationRequest, ClassReliability, DirectionKind,
-    HeadsetScan, Progress, ScaleEstimate, Stage, Verdict, WeakDirection,
+    Calibration, CalibrationOptions, CalibrationRequest, ClassReliability, DirectionKind, Progress,
+    ScaleEstimate, SourceCloud, Stage, Verdict, WeakDirection,
 };
 
 /// Hypotheses of the search by surfaces: a piece of wall fits many walls.

@@ -188,7 +188,7 @@ impl PoseCovariance {
 mod tests {
     use super::super::CalibrationMap;
     use super::super::input::Input;
-    use super::super::types::{CalibrationOptions, CalibrationRequest, HeadsetScan};
+    use super::super::types::{CalibrationOptions, CalibrationRequest, SourceCloud};
     use super::*;
     use crate::registration::SemanticCloud;
     use nalgebra::{Matrix6, Vector3};
@@ -247,12 +247,12 @@ mod tests {
     fn a_pose_that_slid_along_a_wall_climbs_back() {
         let map = CalibrationMap::new(wall(2.4, 1.4), 0.05).unwrap();
         let options = CalibrationOptions::default();
-        let scan = HeadsetScan {
+        let scan = SourceCloud {
             cloud: wall(1.4, 0.9),
             sensor_m: Some(Point3::origin()),
         };
         let request = CalibrationRequest {
-            headset_scans: &[scan],
+            source_clouds: &[scan],
             start: None,
             confusion: None,
         };

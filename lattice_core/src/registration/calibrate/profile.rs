@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::cloud_statistics::CloudStatistics;
-use super::types::{CalibrationOptions, HeadsetScan};
+use super::types::{CalibrationOptions, SourceCloud};
 
 /// Range beyond which a laser scanner outdoors is at work, metres.
 const LIDAR_M: f64 = 15.0;
@@ -40,7 +40,7 @@ impl Profile {
     }
 
     /// The profile of the sensor that clouds look like, by their range, density and noise.
-    pub fn of(scans: &[HeadsetScan]) -> Profile {
+    pub fn of(scans: &[SourceCloud]) -> Profile {
         let cloud = CloudStatistics::of(scans);
         let is_noisy = cloud.noise_m >= NOISY_M;
         match cloud.range_m {
@@ -94,7 +94,7 @@ mod tests {
     use nalgebra::Point3;
 
     /// Points `apart_m` from each other on a wall of `side_m`, with up to `noise_m` across it, seen from as far away.
-    fn wall(side_m: f64, apart_m: f64, noise_m: f64) -> HeadsetScan {
+    fn wall(side_m: f64, apart_m: f64, noise_m: f64) -> SourceCloud {
         let n = (side_m / apart_m) as u32;
         let places = (0..n).flat_map(|y| (0..n).map(move |z| (y, z)));
         let point = |(y, z): (u32, u32)| {
@@ -102,7 +102,7 @@ mod tests {
             let [y, z] = [y, z].map(|i| apart_m * (f64::from(i) + 0.5) - 0.5 * side_m);
             Point3::new(side_m + 0.03 + across_m, y, z)
         };
-        HeadsetScan {
+        SourceCloud {
             cloud: SemanticCloud::unlabelled(places.map(point).collect()),
             sensor_m: Some(Point3::origin()),
         }

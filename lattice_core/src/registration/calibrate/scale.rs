@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use super::super::PreparedCloud;
 use super::super::likelihood::region_of;
 use super::covariance::{ErrorModel, KERNEL};
-use super::types::{Calibration, CalibrationRequest, HeadsetScan, ScaleEstimate};
+use super::types::{Calibration, CalibrationRequest, ScaleEstimate, SourceCloud};
 use crate::pose::se3;
 
 /// Steps of Gauss and Newton, with new partners before each.
@@ -94,11 +94,11 @@ pub(super) fn calibrate_scaled(
             break;
         };
         total *= left.scale;
-        let headset_scans: Vec<HeadsetScan> = (request.headset_scans.iter())
+        let source_clouds: Vec<SourceCloud> = (request.source_clouds.iter())
             .map(|scan| scaled(scan, total))
             .collect();
         let request = CalibrationRequest {
-            headset_scans: &headset_scans,
+            source_clouds: &source_clouds,
             ..*request
         };
         found = calibrate(&request);
@@ -114,7 +114,7 @@ pub(super) fn calibrate_scaled(
     found
 }
 
-fn scaled(scan: &HeadsetScan, by: f64) -> HeadsetScan {
+fn scaled(scan: &SourceCloud, by: f64) -> SourceCloud {
     let mut scan = scan.clone();
     let points = scan.cloud.points_m.iter_mut().chain(&mut scan.sensor_m);
     points.for_each(|point| point.coords *= by);

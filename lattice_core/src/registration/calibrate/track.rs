@@ -6,7 +6,7 @@ use super::candidates::Workbench;
 use super::input::Input;
 use super::judge::is_held;
 use super::map::CalibrationMap;
-use super::types::{CalibrationOptions, CalibrationRequest, HeadsetScan};
+use super::types::{CalibrationOptions, CalibrationRequest, SourceCloud};
 
 /// Log-likelihood by which a refined pose must be better to replace the old one.
 const BETTER: f64 = 2.0;
@@ -31,12 +31,12 @@ pub struct TrackUpdate {
 /// A look that cannot be used fits as little as one from elsewhere.
 pub fn track(
     map: &CalibrationMap,
-    headset_scan: &HeadsetScan,
+    source_cloud: &SourceCloud,
     map_from_headset: &Isometry3<f64>,
     options: &CalibrationOptions,
 ) -> TrackUpdate {
     let request = CalibrationRequest {
-        headset_scans: std::slice::from_ref(headset_scan),
+        source_clouds: std::slice::from_ref(source_cloud),
         start: None,
         confusion: None,
     };

@@ -12,7 +12,7 @@ use crate::registration::{Confusion, SemanticCloud};
 
 /// One scan of the headset.
 #[derive(Clone, PartialEq, Debug, Default)]
-pub struct HeadsetScan {
+pub struct SourceCloud {
     /// Points in the headset's frame: metres, forward, left, up, gravity along -z.
     pub cloud: SemanticCloud,
     /// Place of the headset in the same frame, if it is known.
@@ -23,7 +23,7 @@ pub struct HeadsetScan {
 #[derive(Clone, Copy, Debug)]
 pub struct CalibrationRequest<'a> {
     /// Scans in one frame; each further one multiplies the likelihood.
-    pub headset_scans: &'a [HeadsetScan],
+    pub source_clouds: &'a [SourceCloud],
     /// `map_from_headset` near which the answer is, if something is known.
     pub start: Option<Isometry3<f64>>,
     /// Co-occurrence of labels from earlier calibrations.

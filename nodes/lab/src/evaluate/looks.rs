@@ -1,6 +1,6 @@
 //! Random poses of looks, and parts of them.
 
-use lattice_core::registration::HeadsetScan;
+use lattice_core::registration::SourceCloud;
 use nalgebra::{Isometry3, Vector3};
 
 use crate::random::Stream;
@@ -17,7 +17,7 @@ pub fn signed(random: &mut Stream) -> f64 {
 }
 
 /// Keeps the points within `half_rad` of a random heading.
-pub fn keep_sector(scan: &mut HeadsetScan, half_rad: f64, random: &mut Stream) {
+pub fn keep_sector(scan: &mut SourceCloud, half_rad: f64, random: &mut Stream) {
     let Some(eye) = scan.sensor_m else { return };
     let turn = std::f64::consts::PI * signed(random);
     let heading = Vector3::new(turn.cos(), turn.sin(), 0.0);

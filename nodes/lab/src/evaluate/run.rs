@@ -238,7 +238,7 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
         }
         TaskMethod::Ours | TaskMethod::Timed => {
             let request = CalibrationRequest {
-                headset_scans: &scenario.headset_scans,
+                source_clouds: &scenario.headset_scans,
                 start,
                 confusion: None,
             };

@@ -1,7 +1,7 @@
 //! Lidar scans of a simulated street, some metres apart, registered without a start.
 
 use lattice_core::registration::{
-    CalibrationMap, CalibrationRequest, HeadsetScan, Profile, calibrate, voxel_downsample,
+    CalibrationMap, CalibrationRequest, Profile, SourceCloud, calibrate, voxel_downsample,
 };
 use nalgebra::Point3;
 
@@ -74,7 +74,7 @@ impl Case for Pair {
         let thinned = voxel_downsample(&cloud, CELL_SIDE_M).points_m;
         let overlap = shared(&thinned, map.cloud(), &truth, SHARED_M);
         let request = CalibrationRequest {
-            headset_scans: &[HeadsetScan {
+            source_clouds: &[SourceCloud {
                 cloud,
                 sensor_m: Some(Point3::origin()),
             }],

@@ -6,8 +6,8 @@ use crate::bench::timed;
 use crate::evaluate::trial::rounded;
 use crate::metrics::PoseError;
 use lattice_core::registration::{
-    CalibrationMap, CalibrationRequest, HeadsetScan, PrepareOptions, PreparedCloud, Profile,
-    SemanticCloud, calibrate, register, voxel_downsample,
+    CalibrationMap, CalibrationRequest, PrepareOptions, PreparedCloud, Profile, SemanticCloud,
+    SourceCloud, calibrate, register, voxel_downsample,
 };
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde::Serialize;
@@ -170,12 +170,12 @@ impl Pair {
                     true => &source.thinned,
                     false => &source.whole,
                 };
-                let headset_scans = [HeadsetScan {
+                let headset_scans = [SourceCloud {
                     cloud: cloud.clone(),
                     sensor_m: Some(Point3::origin()),
                 }];
                 let request = CalibrationRequest {
-                    headset_scans: &headset_scans,
+                    source_clouds: &headset_scans,
                     start,
                     confusion: None,
                 };

@@ -82,7 +82,7 @@ impl Case for Trap {
         let map = CalibrationMap::new(map, Self::CELL_SIDE_M)?;
         let seen_m = scan.cloud.points_m.clone();
         let request = CalibrationRequest {
-            headset_scans: &[scan],
+            source_clouds: &[scan],
             start: None,
             confusion: None,
         };

@@ -4,13 +4,13 @@ use crate::evaluate::looks::{any_pose, keep_sector, signed};
 use crate::random::Stream;
 use crate::simulate::rooms::{Flat, LOOKS};
 use lattice_core::pose::Axes;
-use lattice_core::registration::{CalibrationOptions, HeadsetScan, SemanticCloud};
+use lattice_core::registration::{CalibrationOptions, SemanticCloud, SourceCloud};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 /// A map and a scan, with the truth.
 pub(super) struct Scene {
     pub map: SemanticCloud,
-    pub scan: HeadsetScan,
+    pub scan: SourceCloud,
     pub options: CalibrationOptions,
     pub truth: Isometry3<f64>,
 }
@@ -146,7 +146,7 @@ impl Fault {
             Fault::Mirrored => Vector3::new(p.x, -p.y, p.z),
             Fault::Elsewhere => p,
         };
-        let mut scan = HeadsetScan {
+        let mut scan = SourceCloud {
             cloud,
             sensor_m: Some(truth.inverse() * eye),
         };
