@@ -121,7 +121,7 @@ pub fn calibrate(
     })??;
     Ok(Calibration {
         verdict: found.verdict.name().to_owned(),
-        map_from_cloud: matrix_of(py, &found.map_from_headset)?,
+        map_from_cloud: matrix_of(py, &found.target_from_source)?,
         covariance: matrix6_of(py, &found.covariance)?,
         p_wrong: found.margin.p_wrong(),
         inlier_fraction: found.inlier_fraction,

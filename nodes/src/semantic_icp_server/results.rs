@@ -50,7 +50,8 @@ impl SemanticIcpServer {
             return;
         }
         let before = self.known.as_ref().map(|known| known.map_from_headset);
-        let moved = before.is_some_and(|before| !is_near(&before, &found.map_from_headset, MOVED));
+        let moved =
+            before.is_some_and(|before| !is_near(&before, &found.target_from_source, MOVED));
         if running.confirms {
             self.counts.confirmations += 1;
             self.counts.poses_withdrawn += u64::from(moved);
@@ -79,7 +80,7 @@ impl SemanticIcpServer {
                         .add(Arc::clone(headset_scan), running.stamp_ns, now_ns);
                 }
                 let known = Known {
-                    map_from_headset: found.map_from_headset,
+                    map_from_headset: found.target_from_source,
                     result: result.clone(),
                     looks: running.headset_scans.len(),
                 };
@@ -187,10 +188,10 @@ impl SemanticIcpServer {
             return;
         };
         self.misses = 0;
-        known.map_from_headset = update.map_from_headset;
+        known.map_from_headset = update.target_from_source;
         let mut result = known.result.clone();
         let covariance = nalgebra::Matrix6::from_row_slice(&result.covariance);
-        set_pose(&mut result, &update.map_from_headset, &covariance);
+        set_pose(&mut result, &update.target_from_source, &covariance);
         result.inlier_fraction = update.inlier_fraction;
         result.rmse_m = update.rmse_m;
         result.method = "tracking".into();
@@ -203,7 +204,7 @@ impl SemanticIcpServer {
         }
         let published = geometry::isometry_from_transform(&self.last.transform);
         let same =
-            published.is_some_and(|last| is_near(&last, &update.map_from_headset, SAME_POSE));
+            published.is_some_and(|last| is_near(&last, &update.target_from_source, SAME_POSE));
         let recent = now_ns.saturating_sub(self.published_ns) < PUBLISH_AGAIN_NS;
         if !(same && recent && self.last.verdict == CalibrationResult::OK) {
             self.publish(result, now_ns, out);

@@ -62,7 +62,7 @@ fn every_place_is_found_without_a_start() {
         // The last one without the place of the sensor, which rules out some poses.
         scan.sensor_m = scan.sensor_m.filter(|_| look != 4);
         let found = ask(&map, &[scan], None);
-        let error = distance(&found.map_from_headset, &truth);
+        let error = distance(&found.target_from_source, &truth);
         assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
         assert!(error.0 < 0.03 && error.1 < 0.006, "{error:?}");
     }
@@ -83,7 +83,7 @@ fn wrong_labels_cost_nothing() {
     let start = truth * Isometry3::new(Vector3::new(0.2, -0.2, 0.05), Vector3::z() * 0.15);
     for start in [None, Some(start)] {
         let found = ask(&map, std::slice::from_ref(&headset_scan), start);
-        let error = distance(&found.map_from_headset, &truth);
+        let error = distance(&found.target_from_source, &truth);
         assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
         assert!(error.0 < 0.02, "{error:?}");
         // It was learned what they are called here.
@@ -167,9 +167,12 @@ fn looks_at_one_plane_do_not_drag_a_tracked_pose() {
     let off = truth * Isometry3::new(Vector3::new(0.0, 0.0, 0.03), Vector3::z() * 0.005);
     let follow = |look| track(&map, look, &off, &CalibrationOptions::default());
     let update = follow(&floor);
-    assert!(update.fits && update.map_from_headset == off, "{update:?}");
+    assert!(
+        update.fits && update.target_from_source == off,
+        "{update:?}"
+    );
     // All of the look holds it.
-    assert!(distance(&follow(&look).map_from_headset, &truth).0 < 0.01);
+    assert!(distance(&follow(&look).target_from_source, &truth).0 < 0.01);
 }
 
 #[test]
@@ -202,10 +205,10 @@ fn a_tracked_pose_follows_and_breaks() {
     let options = CalibrationOptions::default();
     let update = track(&map, &scan(&flat, 1, &truth), &off, &options);
     assert!(update.fits);
-    assert!(distance(&update.map_from_headset, &truth).0 < 0.01);
+    assert!(distance(&update.target_from_source, &truth).0 < 0.01);
     let elsewhere = scan(&flat, 1, &Isometry3::translation(50.0, 0.0, 9.0));
     let lost = track(&map, &elsewhere, &truth, &options);
-    assert!(!lost.fits && lost.map_from_headset == truth);
+    assert!(!lost.fits && lost.target_from_source == truth);
     let unusable = track(&map, &SourceCloud::default(), &truth, &options);
-    assert!(!unusable.fits && unusable.map_from_headset == truth);
+    assert!(!unusable.fits && unusable.target_from_source == truth);
 }

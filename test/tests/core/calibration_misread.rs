@@ -48,7 +48,7 @@ impl Scene {
     }
 
     fn off_m(&self, found: &Calibration) -> f64 {
-        (found.map_from_headset.translation.vector - self.truth.translation.vector).norm()
+        (found.target_from_source.translation.vector - self.truth.translation.vector).norm()
     }
 }
 
@@ -112,7 +112,7 @@ fn no_other_axes_are_tried_of_a_cloud_whose_axes_are_trusted() {
     };
     let [checked, found] = [given, trusted].map(|options| scene.ask(&options, |p| p));
     assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
-    assert_eq!(found.map_from_headset, checked.map_from_headset);
+    assert_eq!(found.target_from_source, checked.target_from_source);
     assert_eq!(found.other_reading_ahead, None);
     let mirror = |p: Vector3<f64>| Vector3::new(p.x, -p.y, p.z);
     let found = scene.ask(&trusted, mirror);

@@ -16,7 +16,7 @@ const MIDST: Point3<f64> = Point3::new(1.6, 1.5, 0.5);
 fn ask(seen: &Flat, mapped: &Flat) -> Calibration {
     let (found, truth) = ask_by(seen, mapped, &CalibrationOptions::default());
     assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
-    let off_m = (found.map_from_headset.translation.vector - truth.translation.vector).norm();
+    let off_m = (found.target_from_source.translation.vector - truth.translation.vector).norm();
     assert!(off_m < 0.03, "{off_m}");
     found
 }

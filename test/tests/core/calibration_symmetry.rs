@@ -29,7 +29,7 @@ fn ask(room: &Flat, reach_m: [f64; 2], seed: u64) -> (Calibration, f64) {
     };
     let found = calibrate(&map, &request, &CalibrationOptions::default(), &());
     let eye = truth * scan.sensor_m.unwrap();
-    let seen = found.map_from_headset * scan.sensor_m.unwrap();
+    let seen = found.target_from_source * scan.sensor_m.unwrap();
     (found, nalgebra::distance(&eye, &seen))
 }
 

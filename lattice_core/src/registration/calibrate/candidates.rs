@@ -32,7 +32,7 @@ const DIFFERENT_RAD: f64 = 0.26;
 /// A pose with what speaks for it.
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
-    pub map_from_headset: Isometry3<f64>,
+    pub target_from_source: Isometry3<f64>,
     pub method: &'static str,
     pub likelihood: Likelihood,
     /// Lines of sight through walls, as log-likelihood.
@@ -57,7 +57,7 @@ impl Candidate {
         shift_m: f64,
         turn_rad: f64,
     ) -> bool {
-        let pose = &self.map_from_headset;
+        let pose = &self.target_from_source;
         nalgebra::distance(&(pose * middle), &(other * middle)) < shift_m
             && pose.rotation.angle_to(&other.rotation) < turn_rad
     }
@@ -138,7 +138,7 @@ impl<'a> Workbench<'a> {
             .par_iter()
             .map(|candidate| {
                 let (full, map) = (&self.input.full, &self.map.cloud);
-                let pose = register(full, map, &candidate.map_from_headset, &options);
+                let pose = register(full, map, &candidate.target_from_source, &options);
                 self.judge(&self.fit, pose.target_from_source, "search")
             })
             .collect();
@@ -166,7 +166,7 @@ impl<'a> Workbench<'a> {
         let middle = self.middle();
         let mut kept: Vec<Candidate> = Vec::new();
         for candidate in candidates {
-            let pose = &candidate.map_from_headset;
+            let pose = &candidate.target_from_source;
             let near = |other: &Candidate| other.is_near(pose, &middle, self.map.spacing_m, 0.02);
             if kept.len() < most && !kept.iter().any(near) {
                 kept.push(candidate);
@@ -235,7 +235,7 @@ impl<'a> Workbench<'a> {
             fit.likelihood(&partners, &self.known, self.options.agreement);
         let sensor_m = self.input.sensor_m.as_ref();
         Candidate {
-            map_from_headset: pose,
+            target_from_source: pose,
             method,
             likelihood,
             blocked: self.blocked(&self.input.few, sensor_m, &pose) * fit.observations(),

@@ -45,7 +45,7 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
     };
     let middle = bench.middle();
     let (shift_m, turn_rad) = bench.least_difference();
-    let pose = best.map_from_headset;
+    let pose = best.target_from_source;
     let fit = absolute_fit(bench, &pose);
     let margin = margin(bench, &all, best, &fit);
     let covariance = covariance(bench, best).map(|surfaces| {
@@ -54,7 +54,7 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
             .filter(|c| c.is_near(&pose, &middle, shift_m, turn_rad));
         near.fold(bench.probed(best, surfaces), |sure, rival| {
             let odds = ((rival.total() - best.total()) / SOFTNESS).exp().min(1.0);
-            sure.with_rival(&pose, &rival.map_from_headset, odds / (1.0 + odds))
+            sure.with_rival(&pose, &rival.target_from_source, odds / (1.0 + odds))
         })
     });
     // Both frames know where down is; but what GICP made of a start stands as it is.
@@ -91,7 +91,7 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         verdict,
         reason,
         cancelled: false,
-        map_from_headset: pose,
+        target_from_source: pose,
         covariance: covariance.map_or_else(Matrix6::zeros, |c| c.in_target(&pose)),
         margin,
         fit,
@@ -118,9 +118,9 @@ fn margin(bench: &Workbench<'_>, all: &[Candidate], best: &Candidate, fit: &Abso
         .iter()
         .filter(|rival| bench.is_within_reach(rival, best));
     rivals.truncate(within_reach.count().max(1));
-    let poses: Vec<&Isometry3<f64>> = rivals.iter().map(|c| &c.map_from_headset).collect();
+    let poses: Vec<&Isometry3<f64>> = rivals.iter().map(|c| &c.target_from_source).collect();
     let region_m = bench.options.region_m;
-    let even = bench.fit.even(&best.map_from_headset, &poses, region_m);
+    let even = bench.fit.even(&best.target_from_source, &poses, region_m);
     let ahead = |rival: &&Candidate| best.total() - rival.total().max(nowhere);
     let places = rivals.iter().map(ahead).zip(even);
     let contradicted = CONTRADICTED * (fit.floating + fit.blocked);
@@ -135,7 +135,7 @@ fn margin(bench: &Workbench<'_>, all: &[Candidate], best: &Candidate, fit: &Abso
 
 /// True if the surfaces hold a pose in all directions, as an answer must that is OK.
 pub(super) fn is_held(bench: &Workbench<'_>, candidate: &Candidate) -> bool {
-    let pose = &candidate.map_from_headset;
+    let pose = &candidate.target_from_source;
     let sure = covariance(bench, candidate);
     let sure = sure.and_then(|sure| sure.with_gravity(pose, bench.options.gravity_sigma_rad));
     sure.is_some_and(|sure| weak(bench, &sure, pose).is_empty())
@@ -190,7 +190,7 @@ fn choose<'a>(bench: &Workbench<'_>, all: &'a [Candidate], started: bool) -> Opt
     };
     // A little to the side of what GICP found is hardly better, whatever the likelihood says.
     let (shift_m, turn_rad) = (3.0 * bench.map.spacing_m, 0.09);
-    let beside = gicp.is_near(&best.map_from_headset, &bench.middle(), shift_m, turn_rad);
+    let beside = gicp.is_near(&best.target_from_source, &bench.middle(), shift_m, turn_rad);
     let least = match beside {
         true => DISPLACE.max(0.2 * bench.fit.observations()),
         false => DISPLACE,
@@ -266,13 +266,13 @@ fn contradicted(fit: &AbsoluteFit, options: &CalibrationOptions) -> String {
 pub(super) fn covariance(bench: &Workbench<'_>, best: &Candidate) -> Option<PoseCovariance> {
     let (source, target) = (&bench.input.full, &bench.map.cloud);
     let model = error_model(bench, best);
-    PoseCovariance::at(source, target, &best.map_from_headset, &model)
+    PoseCovariance::at(source, target, &best.target_from_source, &model)
 }
 
 fn scale(bench: &Workbench<'_>, best: &Candidate) -> Option<ScaleEstimate> {
     let (source, target) = (&bench.input.full, &bench.map.cloud);
     let model = error_model(bench, best);
-    let found = scale_at(source, target, &best.map_from_headset, &model)?;
+    let found = scale_at(source, target, &best.target_from_source, &model)?;
     let (pose, scale) = (&found.target_from_source, found.scale);
     let partners = bench.fit.partners_scaled(pose, &model.center, scale);
     Some(ScaleEstimate {

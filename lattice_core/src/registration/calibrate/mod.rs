@@ -102,7 +102,7 @@ fn run(
         .par_iter()
         .take(FINALISTS)
         .filter(|c| c.total() >= hopeful)
-        .flat_map_iter(|c| bench.portfolio(&c.map_from_headset, "search"))
+        .flat_map_iter(|c| bench.portfolio(&c.target_from_source, "search"))
         .collect();
     all.extend(second);
     all.extend(bench.contest(&all, region.as_ref()));

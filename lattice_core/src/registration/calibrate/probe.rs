@@ -74,7 +74,7 @@ impl Workbench<'_> {
         candidate: &Candidate,
         surfaces: &PoseCovariance,
     ) -> Vec<(WeakDirection, Direction)> {
-        let (pose, middle) = (&candidate.map_from_headset, self.middle());
+        let (pose, middle) = (&candidate.target_from_source, self.middle());
         let upright = surfaces.with_gravity(pose, self.options.gravity_sigma_rad);
         let held = upright.as_ref().unwrap_or(surfaces);
         let mut weak = held.directions(pose, &middle);
@@ -85,7 +85,7 @@ impl Workbench<'_> {
     }
 
     fn moved(&self, candidate: &Candidate, along: &Direction, step: f64) -> Candidate {
-        let moved = candidate.map_from_headset * se3::exp(&(along.motion * step));
+        let moved = candidate.target_from_source * se3::exp(&(along.motion * step));
         self.judge(&self.fit, moved, candidate.method)
     }
 
@@ -258,7 +258,7 @@ mod tests {
         };
         let input = Input::new(&request, &options, 0.05).unwrap();
         let bench = Workbench::new(&map, &input, &options, None);
-        let off_m = |candidate: &Candidate| candidate.map_from_headset.translation.vector.norm();
+        let off_m = |candidate: &Candidate| candidate.target_from_source.translation.vector.norm();
         for slide in [Vector3::y() * 0.3, Vector3::y() * -0.45, Vector3::z() * 0.2] {
             let slid = bench.judge(
                 &bench.fit,

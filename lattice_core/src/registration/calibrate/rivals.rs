@@ -32,10 +32,10 @@ impl Workbench<'_> {
         let Some(best) = likeliest(all) else {
             return Vec::new();
         };
-        let mut places = vec![(best.map_from_headset, best.method)];
+        let mut places = vec![(best.target_from_source, best.method)];
         let known = self.rivals(all, best, KNOWN).into_iter();
         let known = known.filter(|rival| self.is_within_reach(rival, best));
-        places.extend(known.map(|rival| (rival.map_from_headset, rival.method)));
+        places.extend(known.map(|rival| (rival.target_from_source, rival.method)));
         let twins = self.twins(best, region);
         places.extend(twins.into_iter().map(|pose| (pose, "search")));
         let refined = places.par_iter().map(|(pose, method)| {
@@ -62,7 +62,7 @@ impl Workbench<'_> {
         let mut kept = vec![best];
         for candidate in sorted {
             let near = |other: &&Candidate| {
-                other.is_near(&candidate.map_from_headset, &middle, shift_m, turn_rad)
+                other.is_near(&candidate.target_from_source, &middle, shift_m, turn_rad)
             };
             if kept.len() <= most && !kept.iter().any(near) {
                 kept.push(candidate);
@@ -79,13 +79,13 @@ impl Workbench<'_> {
     /// The place that fits best with each heading of a symmetric room.
     fn twins(&self, best: &Candidate, region: Option<&Region>) -> Vec<Isometry3<f64>> {
         let source = SearchSource::by_surface(&self.input.few, self.input.sensor_m);
-        let best_of_few = self.judge(&self.few, best.map_from_headset, best.method);
+        let best_of_few = self.judge(&self.few, best.target_from_source, best.method);
         let hopeful = best_of_few.total() - BEYOND * self.few.observations();
         let twin = |turn_rad: &f64| {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), *turn_rad);
             let about = Isometry3::from_parts(
                 region.map_or_else(Translation3::identity, |region| region.about.translation),
-                turn * best.map_from_headset.rotation,
+                turn * best.target_from_source.rotation,
             );
             let around = Region {
                 about,
@@ -106,7 +106,7 @@ impl Workbench<'_> {
             });
             likeliest(&looked_at.collect::<Vec<_>>())
                 .filter(|twin| twin.total() > hopeful)
-                .map(|twin| self.polish(&twin.map_from_headset))
+                .map(|twin| self.polish(&twin.target_from_source))
         };
         TWINS_RAD.par_iter().filter_map(twin).collect()
     }

@@ -16,8 +16,8 @@ const BETTER: f64 = 2.0;
 pub struct TrackUpdate {
     /// True if the scan fits; a full search is due when several in a row do not.
     pub fits: bool,
-    /// `map_from_headset` after the look; as before if it does not fit.
-    pub map_from_headset: Isometry3<f64>,
+    /// `target_from_source` after the look; as before if it does not fit.
+    pub target_from_source: Isometry3<f64>,
     /// Share of the points on a surface of the map.
     pub inlier_fraction: f64,
     /// Root mean square distance of those from the surfaces, metres.
@@ -32,7 +32,7 @@ pub struct TrackUpdate {
 pub fn track(
     map: &CalibrationMap,
     source_cloud: &SourceCloud,
-    map_from_headset: &Isometry3<f64>,
+    target_from_source: &Isometry3<f64>,
     options: &CalibrationOptions,
 ) -> TrackUpdate {
     let request = CalibrationRequest {
@@ -43,14 +43,14 @@ pub fn track(
     let Ok(input) = Input::new(&request, options, map.spacing_m) else {
         return TrackUpdate {
             fits: false,
-            map_from_headset: *map_from_headset,
+            target_from_source: *target_from_source,
             inlier_fraction: 0.0,
             rmse_m: 0.0,
         };
     };
     let bench = Workbench::new(map, &input, options, None);
-    let old = bench.judge(&bench.fit, *map_from_headset, "tracking");
-    let pose = bench.polish(map_from_headset);
+    let old = bench.judge(&bench.fit, *target_from_source, "tracking");
+    let pose = bench.polish(target_from_source);
     let new = bench.judge(&bench.fit, pose, "tracking");
     let is_better = new.total() > old.total() + BETTER;
     let best = match is_better && is_held(&bench, &new) {
@@ -60,9 +60,9 @@ pub fn track(
     let fits = best.inlier_fraction >= options.min_inliers;
     TrackUpdate {
         fits,
-        map_from_headset: match fits {
-            true => best.map_from_headset,
-            false => *map_from_headset,
+        target_from_source: match fits {
+            true => best.target_from_source,
+            false => *target_from_source,
         },
         inlier_fraction: best.inlier_fraction,
         rmse_m: best.rmse_m,

@@ -24,7 +24,7 @@ pub struct SourceCloud {
 pub struct CalibrationRequest<'a> {
     /// Scans in one frame; each further one multiplies the likelihood.
     pub source_clouds: &'a [SourceCloud],
-    /// `map_from_headset` near which the answer is, if something is known.
+    /// `target_from_source` near which the answer is, if something is known.
     pub start: Option<Isometry3<f64>>,
     /// Co-occurrence of labels from earlier calibrations.
     pub confusion: Option<&'a Confusion>,
@@ -203,7 +203,7 @@ pub struct Calibration {
     /// True if it was ended before it was done.
     pub cancelled: bool,
     /// The best pose that was found; to be used only if the verdict says so.
-    pub map_from_headset: Isometry3<f64>,
+    pub target_from_source: Isometry3<f64>,
     /// Covariance of x, y, z (m^2) and the turns about x, y, z (rad^2), in the map frame, as in
     /// `geometry_msgs/PoseWithCovariance`.
     pub covariance: Matrix6<f64>,
@@ -238,7 +238,7 @@ impl Calibration {
             verdict,
             reason: reason.into(),
             cancelled: false,
-            map_from_headset: Isometry3::identity(),
+            target_from_source: Isometry3::identity(),
             covariance: Matrix6::zeros(),
             scale: None,
             margin: Margin::default(),

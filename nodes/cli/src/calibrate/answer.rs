@@ -132,7 +132,7 @@ impl Answer {
             verdict: Some(calibration.verdict.name()),
             reason: calibration.reason.clone(),
             method: calibration.method.to_owned(),
-            map_from_cloud: Pose::of(&calibration.map_from_headset),
+            map_from_cloud: Pose::of(&calibration.target_from_source),
             // Symmetric, so that the order of columns is that of rows.
             covariance: Some(covariance.iter().copied().collect()),
             sigma_m: Some([0, 1, 2].map(sigma)),

@@ -244,7 +244,7 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
             };
             let calibration = calibrate(&scenario.map, &request, &options, &());
             let wall_ms = ms(started);
-            trial(&calibration.map_from_headset, wall_ms)
+            trial(&calibration.target_from_source, wall_ms)
                 .with_judgement(&calibration, &scenario.truth)
         }
         TaskMethod::Tracked => {
@@ -252,7 +252,7 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
             let scan = scenario.headset_scans.first();
             let update = scan.map(|scan| track(&scenario.map, scan, &start, &options));
             let wall_ms = ms(started);
-            trial(&update.map_or(start, |u| u.map_from_headset), wall_ms)
+            trial(&update.map_or(start, |u| u.target_from_source), wall_ms)
         }
     }
 }

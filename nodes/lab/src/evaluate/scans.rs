@@ -69,7 +69,7 @@ impl Scans {
     fn of_all_points(&self) -> Result<Isometry3<f64>, AnyError> {
         let found = self.find(&self.scan);
         match found.verdict {
-            Verdict::Ok => Ok(found.map_from_headset),
+            Verdict::Ok => Ok(found.target_from_source),
             verdict => Err(format!(
                 "the whole scan is {}: {}; give its pose",
                 verdict.name(),

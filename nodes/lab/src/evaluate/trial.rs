@@ -219,7 +219,7 @@ pub(super) fn rounded(value: f64) -> f64 {
 /// e^T C^-1 e of the position and the rotation vector by which a pose is off, both along the axes of
 /// the map.
 fn nees(calibration: &Calibration, truth: &Isometry3<f64>) -> Option<f64> {
-    let pose = &calibration.map_from_headset;
+    let pose = &calibration.target_from_source;
     let moved = pose.translation.vector - truth.translation.vector;
     let turned = (pose.rotation * truth.rotation.inverse()).scaled_axis();
     let error = Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z);
@@ -254,7 +254,7 @@ mod tests {
         assert!(trial.is_within(WRONG) && !trial.is_accepted());
 
         let calibration = Calibration {
-            map_from_headset: off,
+            target_from_source: off,
             covariance: Matrix6::from_diagonal(&Vector6::from([1e-4; 6])),
             margin: Margin {
                 log: f64::INFINITY,

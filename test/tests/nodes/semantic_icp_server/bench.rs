@@ -37,7 +37,7 @@ pub struct Fake {
 
 pub fn found(verdict: Verdict, x: f64) -> Calibration {
     let mut found = Calibration::refused(verdict, format!("{verdict:?}"));
-    found.map_from_headset = Isometry3::translation(x, 0.0, 0.0);
+    found.target_from_source = Isometry3::translation(x, 0.0, 0.0);
     found.inlier_fraction = 0.9;
     found
 }
@@ -77,7 +77,7 @@ impl Search for Fake {
         let fits = self.fits.pop_front().unwrap_or(0.9);
         Some(TrackUpdate {
             fits: fits >= CalibrationOptions::default().min_inliers,
-            map_from_headset: Isometry3::translation(0.001, 0.0, 0.0) * map_from_headset,
+            target_from_source: Isometry3::translation(0.001, 0.0, 0.0) * map_from_headset,
             inlier_fraction: fits,
             rmse_m: 0.01,
         })

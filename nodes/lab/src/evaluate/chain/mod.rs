@@ -262,7 +262,7 @@ impl Chain<'_> {
                 confusion: None,
             };
             let found = calibrate(map, &request, &CalibrationOptions::default(), &());
-            let pose = &found.map_from_headset;
+            let pose = &found.target_from_source;
             // Times are taken beside other trials: they would say nothing.
             let trial = Trial::of_pose(&none, method, pose, &truth, &cloud.points_m, 0.0);
             trials.push(Trial {

@@ -185,7 +185,7 @@ impl Pair {
                     register_ms: 1e3 * spent.cpu_s,
                     verdict: Some(found.verdict.name().to_owned()),
                     margin: Some(rounded(found.margin.log)).filter(|m| m.is_finite()),
-                    ..row(&found.map_from_headset, target.map_ms)
+                    ..row(&found.target_from_source, target.map_ms)
                 }
             }
         })

@@ -88,7 +88,7 @@ impl Case for Trap {
         };
         let found = calibrate(&map, &request, &options, &());
         // Times are taken beside other trials: they would say nothing.
-        let trial = Trial::of_pose(cell, OURS, &found.map_from_headset, &truth, &seen_m, 0.0);
+        let trial = Trial::of_pose(cell, OURS, &found.target_from_source, &truth, &seen_m, 0.0);
         Ok(trial.with_judgement(&found, &truth))
     }
 }
