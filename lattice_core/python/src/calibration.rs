@@ -2,7 +2,7 @@
 
 use lattice_core::registration::{
     CalibrationMap, CalibrationRequest, SourceCloud, LabelDistribution, Profile, SemanticCloud,
-    calibrate as search,
+    register_global,
 };
 use nalgebra::Point3;
 use pyo3::prelude::*;
@@ -116,7 +116,7 @@ pub fn calibrate(
                 start,
                 confusion: None,
             };
-            Ok::<_, PyErr>(search(&map, &request, &profile.options(), stop))
+            Ok::<_, PyErr>(register_global(&map, &request, &profile.options(), stop))
         })?
     })??;
     Ok(Calibration {

@@ -1,11 +1,11 @@
 //! Registration of labelled point clouds: Semantic-ICP (Parkison et al.; Nakamura et al.) and what it
 //! is measured against.
 
-mod calibrate;
 mod cloud;
 mod confusion;
 mod downsample;
 mod error;
+mod global;
 mod labels;
 mod likelihood;
 mod named;
@@ -15,16 +15,16 @@ mod search;
 mod solver;
 
 pub use crate::kd_tree::{MAX_NEIGHBORS, Neighbors};
-pub use calibrate::{
-    AbsoluteFit, Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest,
-    ClassReliability, DirectionKind, Margin, Profile, Progress, ScaleEstimate, SourceCloud, Stage,
-    TrackUpdate, Unexplained, UnexplainedKind, Verdict, WeakDirection, calibrate, p_wrong_in_words,
-    track,
-};
 pub use cloud::SemanticCloud;
 pub use confusion::{Confusion, Lift};
 pub use downsample::voxel_downsample;
 pub use error::RegistrationError;
+pub use global::{
+    AbsoluteFit, Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest,
+    ClassReliability, DirectionKind, Margin, Profile, Progress, ScaleEstimate, SourceCloud, Stage,
+    TrackUpdate, Unexplained, UnexplainedKind, Verdict, WeakDirection, p_wrong_in_words,
+    register_global, track,
+};
 pub use labels::{LabelDistribution, UNLABELED};
 pub use named::NamedMethod;
 pub use options::{LabelUse, MAX_CANDIDATES, Method, RegisterOptions, SemanticVariant};

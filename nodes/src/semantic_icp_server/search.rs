@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use lattice_core::registration::{
     Calibration, CalibrationMap, CalibrationRequest, Confusion, Profile, Progress, SemanticCloud,
-    SourceCloud, Stage, TrackUpdate, Verdict, calibrate, track,
+    SourceCloud, Stage, TrackUpdate, Verdict, register_global, track,
 };
 use lattice_runtime::lock;
 use nalgebra::Isometry3;
@@ -101,7 +101,7 @@ impl Search for LatticeSearch {
         };
         let options = *lock(&self.options);
         let options = options.of_clouds(headset_scans);
-        let mut found = calibrate(map, &request, &options, progress);
+        let mut found = register_global(map, &request, &options, progress);
         if options.profile != Profile::Headset {
             found.reason = format!("{}; profile {}", found.reason, options.profile);
         }

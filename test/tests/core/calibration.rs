@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use lattice_core::registration::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, LabelDistribution,
-    Progress, SemanticCloud, SourceCloud, Stage, Verdict, calibrate, track,
+    Progress, SemanticCloud, SourceCloud, Stage, Verdict, register_global, track,
 };
 use lattice_lab::simulate::rooms::{Flat, LOOKS};
 use lattice_test::random::Random;
@@ -49,7 +49,7 @@ fn ask(
         start,
         confusion: None,
     };
-    calibrate(map, &request, &CalibrationOptions::default(), &())
+    register_global(map, &request, &CalibrationOptions::default(), &())
 }
 
 #[test]
@@ -192,7 +192,7 @@ fn it_can_be_ended() {
         start: None,
         confusion: None,
     };
-    let found = calibrate(&map(&flat), &request, &CalibrationOptions::default(), &Stop);
+    let found = register_global(&map(&flat), &request, &CalibrationOptions::default(), &Stop);
     assert!(found.cancelled);
 }
 

@@ -3,7 +3,7 @@
 use lattice_core::pose::Axes;
 use lattice_core::registration::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, SourceCloud, Verdict,
-    calibrate,
+    register_global,
 };
 use lattice_lab::simulate::rooms::{Flat, LOOKS};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -44,7 +44,7 @@ impl Scene {
             start: None,
             confusion: None,
         };
-        calibrate(&self.map, &request, options, &())
+        register_global(&self.map, &request, options, &())
     }
 
     fn off_m(&self, found: &Calibration) -> f64 {

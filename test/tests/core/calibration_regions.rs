@@ -2,7 +2,7 @@
 
 use lattice_core::registration::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, SourceCloud,
-    UnexplainedKind, Verdict, calibrate,
+    UnexplainedKind, Verdict, register_global,
 };
 use lattice_lab::simulate::rooms::{Flat, LOOKS};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -40,7 +40,7 @@ fn ask_by(
         start: None,
         confusion: None,
     };
-    (calibrate(&map, &request, options, &()), truth)
+    (register_global(&map, &request, options, &()), truth)
 }
 
 fn with_box() -> Flat {

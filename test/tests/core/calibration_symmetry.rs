@@ -1,7 +1,7 @@
 //! Rooms that look alike from several places: no pose may be called certain.
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, Verdict, calibrate,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, Verdict, register_global,
 };
 use lattice_lab::simulate::rooms::Flat;
 use lattice_test::random::Random;
@@ -27,7 +27,7 @@ fn ask(room: &Flat, reach_m: [f64; 2], seed: u64) -> (Calibration, f64) {
         start: None,
         confusion: None,
     };
-    let found = calibrate(&map, &request, &CalibrationOptions::default(), &());
+    let found = register_global(&map, &request, &CalibrationOptions::default(), &());
     let eye = truth * scan.sensor_m.unwrap();
     let seen = found.target_from_source * scan.sensor_m.unwrap();
     (found, nalgebra::distance(&eye, &seen))

@@ -14,7 +14,7 @@ use clap::Args;
 use lattice_core::pose::Axes;
 use lattice_core::registration::{
     CalibrationMap, CalibrationOptions, CalibrationRequest, SemanticCloud, SourceCloud, Stage,
-    Verdict, calibrate,
+    Verdict, register_global,
 };
 use nalgebra::Isometry3;
 
@@ -174,7 +174,7 @@ impl Calibrate {
             confusion: known.as_ref(),
         };
         let started = Instant::now();
-        let calibration = calibrate(&map, &request, options, &Shown(&bar));
+        let calibration = register_global(&map, &request, options, &Shown(&bar));
         times.calibrate_ms = milliseconds(started);
         bar.done();
         if let (Some(path), Verdict::Ok) = (&self.confusion, calibration.verdict) {

@@ -10,7 +10,7 @@ use super::trial::{OURS, TIMED, TRACKED, Trial, rounded};
 use crate::random::seed_of;
 use crate::simulate::house::Scene;
 use crate::{AnyError, pool};
-use lattice_core::registration::{CalibrationOptions, CalibrationRequest, calibrate, track};
+use lattice_core::registration::{CalibrationOptions, CalibrationRequest, register_global, track};
 use nalgebra::Isometry3;
 use std::collections::HashSet;
 use std::path::Path;
@@ -242,7 +242,7 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
                 start,
                 confusion: None,
             };
-            let calibration = calibrate(&scenario.map, &request, &options, &());
+            let calibration = register_global(&scenario.map, &request, &options, &());
             let wall_ms = ms(started);
             trial(&calibration.target_from_source, wall_ms)
                 .with_judgement(&calibration, &scenario.truth)

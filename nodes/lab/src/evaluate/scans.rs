@@ -2,7 +2,7 @@
 
 use lattice_core::registration::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, SemanticCloud,
-    SourceCloud, Verdict, calibrate, voxel_downsample,
+    SourceCloud, Verdict, register_global, voxel_downsample,
 };
 use nalgebra::{Isometry3, Point3};
 
@@ -124,7 +124,7 @@ impl Scans {
             start: None,
             confusion: None,
         };
-        calibrate(&self.map, &request, &self.options, &())
+        register_global(&self.map, &request, &self.options, &())
     }
 }
 

@@ -1,7 +1,7 @@
 //! Lidar scans of a simulated street, some metres apart, registered without a start.
 
 use lattice_core::registration::{
-    CalibrationMap, CalibrationRequest, Profile, SourceCloud, calibrate, voxel_downsample,
+    CalibrationMap, CalibrationRequest, Profile, SourceCloud, register_global, voxel_downsample,
 };
 use nalgebra::Point3;
 
@@ -81,7 +81,7 @@ impl Case for Pair {
             start: None,
             confusion: None,
         };
-        let found = calibrate(&map, &request, &Profile::Lidar.options(), &());
+        let found = register_global(&map, &request, &Profile::Lidar.options(), &());
         Ok(trial(cell, &found, &truth, &thinned, overlap))
     }
 }

@@ -15,7 +15,7 @@ use std::sync::{Mutex, OnceLock, mpsc};
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::registration::{
     CalibrationMap, CalibrationOptions, CalibrationRequest, PrepareOptions, PreparedCloud,
-    SemanticCloud, SourceCloud, calibrate, voxel_downsample,
+    SemanticCloud, SourceCloud, register_global, voxel_downsample,
 };
 use lattice_nodes::segmenter::{Segmenter, SegmenterOptions, read_network};
 use nalgebra::{Isometry3, Point3};
@@ -261,7 +261,7 @@ impl Chain<'_> {
                 start: None,
                 confusion: None,
             };
-            let found = calibrate(map, &request, &CalibrationOptions::default(), &());
+            let found = register_global(map, &request, &CalibrationOptions::default(), &());
             let pose = &found.target_from_source;
             // Times are taken beside other trials: they would say nothing.
             let trial = Trial::of_pose(&none, method, pose, &truth, &cloud.points_m, 0.0);

@@ -7,7 +7,7 @@ use crate::evaluate::trial::rounded;
 use crate::metrics::PoseError;
 use lattice_core::registration::{
     CalibrationMap, CalibrationRequest, PrepareOptions, PreparedCloud, Profile, SemanticCloud,
-    SourceCloud, calibrate, register, voxel_downsample,
+    SourceCloud, register, register_global, voxel_downsample,
 };
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde::Serialize;
@@ -180,7 +180,8 @@ impl Pair {
                     confusion: None,
                 };
                 let options = Profile::Lidar.options();
-                let (found, spent) = timed(|| calibrate(&target.map, &request, &options, &()));
+                let (found, spent) =
+                    timed(|| register_global(&target.map, &request, &options, &()));
                 PairRow {
                     register_ms: 1e3 * spent.cpu_s,
                     verdict: Some(found.verdict.name().to_owned()),

@@ -6,7 +6,7 @@ mod scenes;
 
 pub use report::traps_report;
 
-use lattice_core::registration::{CalibrationMap, CalibrationRequest, calibrate};
+use lattice_core::registration::{CalibrationMap, CalibrationRequest, register_global};
 
 use super::many::Case;
 use super::settings::Cell;
@@ -86,7 +86,7 @@ impl Case for Trap {
             start: None,
             confusion: None,
         };
-        let found = calibrate(&map, &request, &options, &());
+        let found = register_global(&map, &request, &options, &());
         // Times are taken beside other trials: they would say nothing.
         let trial = Trial::of_pose(cell, OURS, &found.target_from_source, &truth, &seen_m, 0.0);
         Ok(trial.with_judgement(&found, &truth))

@@ -83,10 +83,10 @@ pub(super) fn scale_at(
 /// Calibrates with the points multiplied by their scale, until that is 1.
 ///
 /// `found` is the answer without; the scale of the answer is that of the points as they came.
-pub(super) fn calibrate_scaled(
+pub(super) fn register_scaled(
     request: &CalibrationRequest<'_>,
     mut found: Calibration,
-    calibrate: impl Fn(&CalibrationRequest<'_>) -> Calibration,
+    register_global: impl Fn(&CalibrationRequest<'_>) -> Calibration,
 ) -> Calibration {
     let mut total = 1.0;
     for _ in 0..ROUNDS {
@@ -101,7 +101,7 @@ pub(super) fn calibrate_scaled(
             source_clouds: &source_clouds,
             ..*request
         };
-        found = calibrate(&request);
+        found = register_global(&request);
     }
     if total != 1.0 {
         found.reason = format!("{}; the points were multiplied by {total:.4}", found.reason);

@@ -58,7 +58,7 @@ const SEARCHED_CLASSES: usize = 24;
 /// Finds the pose of the headset's frame in the map.
 ///
 /// Never fails: input that cannot be used is a verdict. Deterministic on any number of threads.
-pub fn calibrate(
+pub fn register_global(
     map: &CalibrationMap,
     request: &CalibrationRequest<'_>,
     options: &CalibrationOptions,
@@ -69,7 +69,7 @@ pub fn calibrate(
     };
     let found = once(request);
     match options.estimate_scale {
-        true => scale::calibrate_scaled(request, found, once),
+        true => scale::register_scaled(request, found, once),
         false => found,
     }
 }
