@@ -64,7 +64,7 @@ impl Candidate {
 }
 
 /// Clouds and settings that candidates are made from.
-pub(super) struct Workbench<'a> {
+pub(super) struct RegistrationContext<'a> {
     pub map: &'a CalibrationMap,
     pub input: &'a Input,
     pub options: &'a CalibrationOptions,
@@ -74,16 +74,16 @@ pub(super) struct Workbench<'a> {
     pub few: Fit<'a>,
 }
 
-impl<'a> Workbench<'a> {
+impl<'a> RegistrationContext<'a> {
     pub fn new(
         map: &'a CalibrationMap,
         input: &'a Input,
         options: &'a CalibrationOptions,
         known: Option<&Confusion>,
-    ) -> Workbench<'a> {
+    ) -> RegistrationContext<'a> {
         let scale = map.scale(options.noise_m);
         let unseen = Confusion::unseen(&shares(&input.few), &map.classes);
-        Workbench {
+        RegistrationContext {
             map,
             input,
             options,

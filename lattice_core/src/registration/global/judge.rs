@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix6, Vector3};
 
 use super::super::likelihood::Partners;
-use super::candidates::{Candidate, Workbench};
+use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::{ErrorModel, PoseCovariance};
 use super::likeliest;
 use super::margin::{Margin, SOFTNESS, p_wrong_in_words};
@@ -39,26 +39,30 @@ const CLOSEST_M: f64 = 1e-3;
 const DISPLACE: f64 = 10.0;
 
 /// Chooses among candidates. With `started`, the first is what GICP makes of the start.
-pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) -> Calibration {
-    let Some(best) = choose(bench, &all, started) else {
+pub(super) fn answer(
+    context: &RegistrationContext<'_>,
+    all: Vec<Candidate>,
+    started: bool,
+) -> Calibration {
+    let Some(best) = choose(context, &all, started) else {
         return Calibration::refused(Verdict::NoOverlap, "no place was found");
     };
-    let middle = bench.middle();
-    let (shift_m, turn_rad) = bench.least_difference();
+    let middle = context.middle();
+    let (shift_m, turn_rad) = context.least_difference();
     let pose = best.target_from_source;
-    let fit = absolute_fit(bench, &pose);
-    let margin = margin(bench, &all, best, &fit);
-    let covariance = covariance(bench, best).map(|surfaces| {
+    let fit = absolute_fit(context, &pose);
+    let margin = margin(context, &all, best, &fit);
+    let covariance = covariance(context, best).map(|surfaces| {
         let near = all
             .iter()
             .filter(|c| c.is_near(&pose, &middle, shift_m, turn_rad));
-        near.fold(bench.probed(best, surfaces), |sure, rival| {
+        near.fold(context.probed(best, surfaces), |sure, rival| {
             let odds = ((rival.total() - best.total()) / SOFTNESS).exp().min(1.0);
             sure.with_rival(&pose, &rival.target_from_source, odds / (1.0 + odds))
         })
     });
     // Both frames know where down is; but what GICP made of a start stands as it is.
-    let gravity = bench.options.gravity_sigma_rad;
+    let gravity = context.options.gravity_sigma_rad;
     let stands = started && all.first().is_some_and(|gicp| std::ptr::eq(gicp, best));
     let upright = (covariance.as_ref())
         .filter(|_| gravity.is_finite())
@@ -68,15 +72,15 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         Some((pose, sure)) if !stands => (pose, Some(sure)),
         _ => (pose, covariance),
     };
-    let options = bench.options;
-    let weak = covariance.as_ref().map(|sure| weak(bench, sure, &pose));
+    let options = context.options;
+    let weak = covariance.as_ref().map(|sure| weak(context, sure, &pose));
     let weak = weak.unwrap_or_default();
     let held = covariance.is_some();
     let (mut verdict, mut reason) = verdict(options, best, &margin, &fit, held, &weak);
-    let scale = scale(bench, best);
+    let scale = scale(context, best);
     if best.inlier_fraction >= options.min_inliers
         && let Some(fault) = leaning(&pose, leans, options)
-            .or_else(|| misscaled(scale, bench.fit.observations(), options))
+            .or_else(|| misscaled(scale, context.fit.observations(), options))
     {
         (verdict, reason) = (Verdict::RejectedInput, fault);
     }
@@ -86,7 +90,7 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
     {
         reason = format!("{reason}; {regions}");
     }
-    let confusion = bench.known.merged(&best.confusion);
+    let confusion = context.known.merged(&best.confusion);
     Calibration {
         verdict,
         reason,
@@ -103,28 +107,33 @@ pub(super) fn answer(bench: &Workbench<'_>, all: Vec<Candidate>, started: bool) 
         method: best.method,
         confusion: match verdict {
             Verdict::Ok => confusion,
-            _ => bench.known.clone(),
+            _ => context.known.clone(),
         },
         scale,
     }
 }
 
 /// Margin of a pose over the best candidates elsewhere.
-fn margin(bench: &Workbench<'_>, all: &[Candidate], best: &Candidate, fit: &AbsoluteFit) -> Margin {
-    let nowhere = bench.fit.nowhere();
-    let mut rivals = bench.rivals(all, best, RIVALS);
+fn margin(
+    context: &RegistrationContext<'_>,
+    all: &[Candidate],
+    best: &Candidate,
+    fit: &AbsoluteFit,
+) -> Margin {
+    let nowhere = context.fit.nowhere();
+    let mut rivals = context.rivals(all, best, RIVALS);
     // The chances of those that are far behind matter only if there are no others.
     let within_reach = rivals
         .iter()
-        .filter(|rival| bench.is_within_reach(rival, best));
+        .filter(|rival| context.is_within_reach(rival, best));
     rivals.truncate(within_reach.count().max(1));
     let poses: Vec<&Isometry3<f64>> = rivals.iter().map(|c| &c.target_from_source).collect();
-    let region_m = bench.options.region_m;
-    let even = bench.fit.even(&best.target_from_source, &poses, region_m);
+    let region_m = context.options.region_m;
+    let even = context.fit.even(&best.target_from_source, &poses, region_m);
     let ahead = |rival: &&Candidate| best.total() - rival.total().max(nowhere);
     let places = rivals.iter().map(ahead).zip(even);
     let contradicted = CONTRADICTED * (fit.floating + fit.blocked);
-    let unexplained = bench.fit.observations() * (1.0 - best.inlier_fraction + contradicted);
+    let unexplained = context.fit.observations() * (1.0 - best.inlier_fraction + contradicted);
     let margin = Margin::over(places, unexplained);
     margin.unwrap_or_else(|| Margin {
         log: best.total() - nowhere,
@@ -134,21 +143,21 @@ fn margin(bench: &Workbench<'_>, all: &[Candidate], best: &Candidate, fit: &Abso
 }
 
 /// True if the surfaces hold a pose in all directions, as an answer must that is OK.
-pub(super) fn is_held(bench: &Workbench<'_>, candidate: &Candidate) -> bool {
+pub(super) fn is_held(context: &RegistrationContext<'_>, candidate: &Candidate) -> bool {
     let pose = &candidate.target_from_source;
-    let sure = covariance(bench, candidate);
-    let sure = sure.and_then(|sure| sure.with_gravity(pose, bench.options.gravity_sigma_rad));
-    sure.is_some_and(|sure| weak(bench, &sure, pose).is_empty())
+    let sure = covariance(context, candidate);
+    let sure = sure.and_then(|sure| sure.with_gravity(pose, context.options.gravity_sigma_rad));
+    sure.is_some_and(|sure| weak(context, &sure, pose).is_empty())
 }
 
 /// Directions in which a pose is not known well enough.
 fn weak(
-    bench: &Workbench<'_>,
+    context: &RegistrationContext<'_>,
     covariance: &PoseCovariance,
     pose: &Isometry3<f64>,
 ) -> Vec<WeakDirection> {
-    let mut directions = covariance.directions(pose, &bench.middle());
-    directions.retain(|d| d.sigma > bench.options.max_sigma(d.kind));
+    let mut directions = covariance.directions(pose, &context.middle());
+    directions.retain(|d| d.sigma > context.options.max_sigma(d.kind));
     directions
 }
 
@@ -183,16 +192,25 @@ fn misscaled(
 }
 
 /// The likeliest, but what GICP makes of a start if that is the same place or nearly as likely.
-fn choose<'a>(bench: &Workbench<'_>, all: &'a [Candidate], started: bool) -> Option<&'a Candidate> {
+fn choose<'a>(
+    context: &RegistrationContext<'_>,
+    all: &'a [Candidate],
+    started: bool,
+) -> Option<&'a Candidate> {
     let best = likeliest(all)?;
     let Some(gicp) = all.first().filter(|_| started) else {
         return Some(best);
     };
     // A little to the side of what GICP found is hardly better, whatever the likelihood says.
-    let (shift_m, turn_rad) = (3.0 * bench.map.spacing_m, 0.09);
-    let beside = gicp.is_near(&best.target_from_source, &bench.middle(), shift_m, turn_rad);
+    let (shift_m, turn_rad) = (3.0 * context.map.spacing_m, 0.09);
+    let beside = gicp.is_near(
+        &best.target_from_source,
+        &context.middle(),
+        shift_m,
+        turn_rad,
+    );
     let least = match beside {
-        true => DISPLACE.max(0.2 * bench.fit.observations()),
+        true => DISPLACE.max(0.2 * context.fit.observations()),
         false => DISPLACE,
     };
     Some(match best.total() < gicp.total() + least {
@@ -263,22 +281,25 @@ fn contradicted(fit: &AbsoluteFit, options: &CalibrationOptions) -> String {
 }
 
 /// Covariance of a candidate's pose by the surfaces; None if they do not hold it at all.
-pub(super) fn covariance(bench: &Workbench<'_>, best: &Candidate) -> Option<PoseCovariance> {
-    let (source, target) = (&bench.input.full, &bench.map.cloud);
-    let model = error_model(bench, best);
+pub(super) fn covariance(
+    context: &RegistrationContext<'_>,
+    best: &Candidate,
+) -> Option<PoseCovariance> {
+    let (source, target) = (&context.input.full, &context.map.cloud);
+    let model = error_model(context, best);
     PoseCovariance::at(source, target, &best.target_from_source, &model)
 }
 
-fn scale(bench: &Workbench<'_>, best: &Candidate) -> Option<ScaleEstimate> {
-    let (source, target) = (&bench.input.full, &bench.map.cloud);
-    let model = error_model(bench, best);
+fn scale(context: &RegistrationContext<'_>, best: &Candidate) -> Option<ScaleEstimate> {
+    let (source, target) = (&context.input.full, &context.map.cloud);
+    let model = error_model(context, best);
     let found = scale_at(source, target, &best.target_from_source, &model)?;
     let (pose, scale) = (&found.target_from_source, found.scale);
-    let partners = bench.fit.partners_scaled(pose, &model.center, scale);
+    let partners = context.fit.partners_scaled(pose, &model.center, scale);
     Some(ScaleEstimate {
         scale,
         sigma: found.sigma,
-        gain: gain(bench.fit.observations(), best, &partners),
+        gain: gain(context.fit.observations(), best, &partners),
     })
 }
 
@@ -293,9 +314,9 @@ fn gain(observations: f64, best: &Candidate, scaled: &Partners) -> f64 {
     both * observations * closer
 }
 
-fn error_model(bench: &Workbench<'_>, best: &Candidate) -> ErrorModel {
-    let options = bench.options;
-    let extent_m = EXTENT * bench.reach_m();
+fn error_model(context: &RegistrationContext<'_>, best: &Candidate) -> ErrorModel {
+    let options = context.options;
+    let extent_m = EXTENT * context.reach_m();
     let is_small = extent_m < LARGE * options.region_m;
     ErrorModel {
         region_m: options.region_m,
@@ -303,10 +324,10 @@ fn error_model(bench: &Workbench<'_>, best: &Candidate) -> ErrorModel {
         // A cloud that fits far closer than expected also errs less as a whole.
         sigma_m: options.noise_m.min(INVISIBLE * best.rmse_m),
         point_m: best.rmse_m,
-        spacing_m: bench.map.spacing_m,
+        spacing_m: context.map.spacing_m,
         scale_sigma: options.scale_sigma,
-        center: bench.input.sensor_m.unwrap_or_else(|| bench.middle()),
-        gate_m: 6.0 * bench.map.spacing_m,
+        center: context.input.sensor_m.unwrap_or_else(|| context.middle()),
+        gate_m: 6.0 * context.map.spacing_m,
     }
 }
 

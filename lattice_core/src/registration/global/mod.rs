@@ -29,7 +29,7 @@ use rayon::prelude::*;
 
 use super::search::{Hypothesis, Region, SearchMap, SearchSource, search};
 use super::{LabelDistribution, PreparedCloud, RegisterOptions, register};
-use candidates::{Candidate, Workbench};
+use candidates::{Candidate, RegistrationContext};
 use input::Input;
 use readings::{Other, Refined, other_reading};
 use types::Refusal;
@@ -82,44 +82,44 @@ fn run(
 ) -> Result<Calibration, Refusal> {
     step(progress, Stage::Prepare, 0.0)?;
     let input = Input::new(request, options, map.spacing_m)?;
-    let bench = Workbench::new(map, &input, options, request.confusion);
+    let context = RegistrationContext::new(map, &input, options, request.confusion);
     step(progress, Stage::Search, 0.1)?;
     let region = request.start.map(|about| Region {
         about,
         radius_m: options.start_radius_m,
         yaw_rad: options.start_yaw_rad,
     });
-    let mut hypotheses = by_surfaces(&bench, region.as_ref());
+    let mut hypotheses = by_surfaces(&context, region.as_ref());
     step(progress, Stage::Search, 0.3)?;
-    hypotheses.extend(by_labels(&bench, region.as_ref()));
+    hypotheses.extend(by_labels(&context, region.as_ref()));
     step(progress, Stage::Refine, 0.5)?;
-    let first = bench.first_look(&hypotheses);
+    let first = context.first_look(&hypotheses);
     step(progress, Stage::Refine, 0.6)?;
-    let second = bench.second_look(&first);
+    let second = context.second_look(&first);
     step(progress, Stage::Refine, 0.7)?;
-    let hopeful = second.first().map_or(0.0, Candidate::total) - bench.hope();
+    let hopeful = second.first().map_or(0.0, Candidate::total) - context.hope();
     let mut all: Vec<Candidate> = second
         .par_iter()
         .take(FINALISTS)
         .filter(|c| c.total() >= hopeful)
-        .flat_map_iter(|c| bench.portfolio(&c.target_from_source, "search"))
+        .flat_map_iter(|c| context.portfolio(&c.target_from_source, "search"))
         .collect();
     all.extend(second);
-    all.extend(bench.contest(&all, region.as_ref()));
+    all.extend(context.contest(&all, region.as_ref()));
     if let Some(start) = &request.start {
         // The first of all is what GICP alone would answer.
-        let mut from_start = from_start(&bench, start);
+        let mut from_start = from_start(&context, start);
         from_start.append(&mut all);
         all = from_start;
     }
     step(progress, Stage::Judge, 0.9)?;
     let refined = Refined::of(&all);
-    let calibration = judge::answer(&bench, all, request.start.is_some());
+    let calibration = judge::answer(&context, all, request.start.is_some());
     let contradicted = calibration.fit.floating + calibration.fit.blocked;
     let in_doubt = contradicted > IN_DOUBT && calibration.verdict != Verdict::RejectedInput;
     let other = match options.trust_axes {
         true => None,
-        false => other_reading(&bench, &first, refined, in_doubt, region.as_ref()),
+        false => other_reading(&context, &first, refined, in_doubt, region.as_ref()),
     };
     let _ = progress.report(Stage::Judge, 1.0);
     Ok(match other {
@@ -184,19 +184,19 @@ fn step(progress: &dyn Progress, stage: Stage, fraction: f64) -> Result<(), Refu
     }
 }
 
-fn by_surfaces(bench: &Workbench<'_>, region: Option<&Region>) -> Vec<Hypothesis> {
-    let source = SearchSource::by_surface(&bench.input.few, bench.input.sensor_m);
-    search(&bench.map.surfaces, &source, region, BY_SURFACES)
+fn by_surfaces(context: &RegistrationContext<'_>, region: Option<&Region>) -> Vec<Hypothesis> {
+    let source = SearchSource::by_surface(&context.input.few, context.input.sensor_m);
+    search(&context.map.surfaces, &source, region, BY_SURFACES)
 }
 
 /// Poses that the labels fit, as far as it is known how they go together.
-fn by_labels(bench: &Workbench<'_>, region: Option<&Region>) -> Vec<Hypothesis> {
-    let (few, map) = (&bench.input.few, &bench.map.cloud);
+fn by_labels(context: &RegistrationContext<'_>, region: Option<&Region>) -> Vec<Hypothesis> {
+    let (few, map) = (&context.input.few, &context.map.cloud);
     if !few.is_labelled() || !map.is_labelled() {
         return Vec::new();
     }
     let classes = frequent_classes(few);
-    let lift = bench.known.lift(bench.options.agreement);
+    let lift = context.known.lift(context.options.agreement);
     let score = |i: usize, channel: usize| {
         let class = classes.get(channel).copied().unwrap_or_default();
         let lift = lift.expected(&LabelDistribution::hard(class), &map.label(i));
@@ -210,10 +210,11 @@ fn by_labels(bench: &Workbench<'_>, region: Option<&Region>) -> Vec<Hypothesis> 
                 .and_then(|top| classes.iter().position(|c| *c == top))
         })
         .collect();
-    let Some(labels) = SearchMap::of_classes(map, bench.map.spacing_m, classes.len(), score) else {
+    let Some(labels) = SearchMap::of_classes(map, context.map.spacing_m, classes.len(), score)
+    else {
         return Vec::new();
     };
-    let source = SearchSource::by_class(few, bench.input.sensor_m, &channels);
+    let source = SearchSource::by_class(few, context.input.sensor_m, &channels);
     search(&labels, &source, region, BY_LABELS)
 }
 
@@ -229,22 +230,22 @@ fn frequent_classes(cloud: &PreparedCloud) -> Vec<u16> {
 }
 
 /// Poses that the methods reach from a given start, GICP-SE(3) first.
-fn from_start(bench: &Workbench<'_>, start: &Isometry3<f64>) -> Vec<Candidate> {
-    let (source, map) = (&bench.input.full, &bench.map.cloud);
+fn from_start(context: &RegistrationContext<'_>, start: &Isometry3<f64>) -> Vec<Candidate> {
+    let (source, map) = (&context.input.full, &context.map.cloud);
     // As published, with its wide gate: it comes from farther than ours, and stands where it is right.
     let published = register(source, map, start, &RegisterOptions::gicp_se3());
-    let mut all = vec![bench.judge(&bench.fit, published.target_from_source, "gicp")];
-    all.extend(bench.portfolio(start, "gicp"));
+    let mut all = vec![context.judge(&context.fit, published.target_from_source, "gicp")];
+    all.extend(context.portfolio(start, "gicp"));
     if source.is_labelled() && map.is_labelled() {
-        let gate_m = (30.0 * bench.map.spacing_m).max(1.0);
+        let gate_m = (30.0 * context.map.spacing_m).max(1.0);
         let options = RegisterOptions {
             gate_m,
             inner_iterations: 2,
             ..RegisterOptions::class_wise_cauchy()
         };
         let pose = register(source, map, start, &options);
-        let polished = bench.polish(&pose.target_from_source);
-        all.push(bench.judge(&bench.fit, polished, "class-wise"));
+        let polished = context.polish(&pose.target_from_source);
+        all.push(context.judge(&context.fit, polished, "class-wise"));
     }
     all
 }

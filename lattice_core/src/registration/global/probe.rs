@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, RowVector6, Vector6};
 use rayon::prelude::*;
 
-use super::candidates::{Candidate, Workbench};
+use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::PoseCovariance;
 use super::judge::covariance;
 use super::margin::SOFTNESS;
@@ -24,7 +24,7 @@ const LIKELIEST: f64 = 1e6;
 const FAR: [f64; 5] = [8.0, 4.0, 2.0, 1.0, 0.5];
 const NEAR: [f64; 3] = [2.0, 1.0, 0.5];
 
-impl Workbench<'_> {
+impl RegistrationContext<'_> {
     /// The covariance of a candidate's pose with what its likelihood says of the directions that surfaces and gravity
     /// leave weak: the ends of a wall and its labels hold a pose along the wall.
     pub fn probed(&self, candidate: &Candidate, surfaces: PoseCovariance) -> PoseCovariance {
@@ -257,15 +257,15 @@ mod tests {
             confusion: None,
         };
         let input = Input::new(&request, &options, 0.05).unwrap();
-        let bench = Workbench::new(&map, &input, &options, None);
+        let context = RegistrationContext::new(&map, &input, &options, None);
         let off_m = |candidate: &Candidate| candidate.target_from_source.translation.vector.norm();
         for slide in [Vector3::y() * 0.3, Vector3::y() * -0.45, Vector3::z() * 0.2] {
-            let slid = bench.judge(
-                &bench.fit,
+            let slid = context.judge(
+                &context.fit,
                 Isometry3::new(slide, Vector3::zeros()),
                 "search",
             );
-            let back = bench.climbed(slid.clone());
+            let back = context.climbed(slid.clone());
             assert!(
                 back.total() > slid.total() && off_m(&back) < 0.05,
                 "{slide}: {}",

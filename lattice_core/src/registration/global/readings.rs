@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::super::likelihood::Fit;
 use super::super::search::{Region, SearchSource, search};
 use super::super::{PrepareOptions, PreparedCloud, SemanticCloud};
-use super::candidates::{Candidate, Workbench};
+use super::candidates::{Candidate, RegistrationContext};
 use crate::pose::Axes;
 
 /// Hypotheses of a search with other axes, and those of them that get all steps of a first look.
@@ -158,20 +158,20 @@ impl Other {
     /// It is possible if it is so with lines of sight or without: a few of them are blocked at right poses too.
     fn looked_at_closely(
         self,
-        bench: &Workbench<'_>,
+        context: &RegistrationContext<'_>,
         poses: &[Isometry3<f64>],
         refined: Refined,
     ) -> Option<Other> {
-        let mended = Mended::new(bench, &bench.input.full, &self.reading)?;
-        let scale = bench.map.scale(bench.options.noise_m);
-        let fit = Fit::new(&mended.cloud, &bench.map.cloud, scale);
-        let observations = bench.fit.observations();
+        let mended = Mended::new(context, &context.input.full, &self.reading)?;
+        let scale = context.map.scale(context.options.noise_m);
+        let fit = Fit::new(&mended.cloud, &context.map.cloud, scale);
+        let observations = context.fit.observations();
         let share = observations / fit.observations().max(1.0);
         let density = observations * self.reading.scale().ln();
         let likelihoods = poses.par_iter().map(|pose| {
-            let pose = bench.settled(&mended.cloud, pose);
-            let likelihood = share * mended.likelihood_at(bench, &fit, &pose) + density;
-            let blocked = bench.blocked(&mended.cloud, mended.sensor_m.as_ref(), &pose);
+            let pose = context.settled(&mended.cloud, pose);
+            let likelihood = share * mended.likelihood_at(context, &fit, &pose) + density;
+            let blocked = context.blocked(&mended.cloud, mended.sensor_m.as_ref(), &pose);
             Refined {
                 likelihood,
                 total: likelihood - blocked * observations,
@@ -223,17 +223,17 @@ impl Refined {
 /// A rough search leaves out those that cannot be it; if none of the rest is certain and the cloud is in doubt, all are
 /// looked at.
 pub(super) fn other_reading(
-    bench: &Workbench<'_>,
+    context: &RegistrationContext<'_>,
     straight: &[Candidate],
     refined: Refined,
     in_doubt: bool,
     region: Option<&Region>,
 ) -> Option<Other> {
-    let as_it_is = Mended::new(bench, &bench.input.few, &Reading::scaled(1.0))?;
-    let rough = as_it_is.rough_score(bench, region);
-    let (axes, scales) = readings(bench, region);
-    let (mut likely, mut rest) = scored(bench, axes, rough - ROUGH, LOOKED_AT);
-    let (scales, other_scales) = scored(bench, scales, rough + SCALED_AHEAD, 1);
+    let as_it_is = Mended::new(context, &context.input.few, &Reading::scaled(1.0))?;
+    let rough = as_it_is.rough_score(context, region);
+    let (axes, scales) = readings(context, region);
+    let (mut likely, mut rest) = scored(context, axes, rough - ROUGH, LOOKED_AT);
+    let (scales, other_scales) = scored(context, scales, rough + SCALED_AHEAD, 1);
     likely.extend(scales);
     rest.extend(other_scales);
     let straight = straight.iter().map(|c| c.likelihood.total());
@@ -243,16 +243,16 @@ pub(super) fn other_reading(
             found.reading,
             found.likelihood,
             straight,
-            bench.few.observations(),
+            context.few.observations(),
         )
     };
     let closely = |found: &Found| {
         let other = by_few(found);
         other
-            .looked_at_closely(bench, &found.poses, refined)
+            .looked_at_closely(context, &found.poses, refined)
             .unwrap_or(other)
     };
-    let mut found = look_at(bench, &likely);
+    let mut found = look_at(context, &likely);
     let first = found
         .iter()
         .max_by(|a, b| a.likelihood.total_cmp(&b.likelihood));
@@ -263,7 +263,7 @@ pub(super) fn other_reading(
     if !in_doubt || best.is_some_and(|other| other.is_certain) {
         return best;
     }
-    found.extend(look_at(bench, &rest));
+    found.extend(look_at(context, &rest));
     found.sort_by(|a, b| b.likelihood.total_cmp(&a.likelihood));
     let others = found.iter().take(DOUBTED).map(closely);
     others.max_by(|a, b| a.ahead.total_cmp(&b.ahead))
@@ -277,15 +277,15 @@ struct Found {
 }
 
 /// Looks at readings by a few points.
-fn look_at(bench: &Workbench<'_>, readings: &[Hopeful<'_>]) -> Vec<Found> {
+fn look_at(context: &RegistrationContext<'_>, readings: &[Hopeful<'_>]) -> Vec<Found> {
     let found = readings.par_iter().filter_map(|(reading, region, mended)| {
         let places = match reading.is_scaled() {
             true => SCALED_PLACES,
             false => MISREAD_PLACES,
         };
         // A density of lengths that are to be multiplied is one over them.
-        let density = bench.few.observations() * reading.scale().ln();
-        let (likelihood, poses) = mended.likelihood(bench, *region, places)?;
+        let density = context.few.observations() * reading.scale().ln();
+        let (likelihood, poses) = mended.likelihood(context, *region, places)?;
         Some(Found {
             reading: *reading,
             likelihood: likelihood + density,
@@ -297,17 +297,17 @@ fn look_at(bench: &Workbench<'_>, readings: &[Hopeful<'_>]) -> Vec<Found> {
 
 /// Readings of axes that a cloud may have, and of scales, each with where it is searched.
 fn readings<'a>(
-    bench: &Workbench<'_>,
+    context: &RegistrationContext<'_>,
     region: Option<&'a Region>,
 ) -> (Vec<Asked<'a>>, Vec<Asked<'a>>) {
     // A cloud that may lean is not of a headset, whose axes are often mistaken.
     let mut axes = vec![(Reading::MIRRORED, region)];
-    if bench.options.gravity_sigma_rad.is_finite() {
+    if context.options.gravity_sigma_rad.is_finite() {
         let on_their_side = Reading::on_their_side().into_iter();
         axes.extend(on_their_side.map(|reading| (reading, None)));
     }
     // Nor is the scale of a laser in doubt.
-    let scales = match bench.options.scale_sigma > 0.0 {
+    let scales = match context.options.scale_sigma > 0.0 {
         true => SCALES.map(|by| (Reading::scaled(by), region)).to_vec(),
         false => Vec::new(),
     };
@@ -319,14 +319,14 @@ type Hopeful<'a> = (Reading, Option<&'a Region>, Mended);
 
 /// The readings to which a rough search gives a score of `least`, the best `most` of them, and the rest.
 fn scored<'a>(
-    bench: &Workbench<'_>,
+    context: &RegistrationContext<'_>,
     readings: Vec<Asked<'a>>,
     least: f64,
     most: usize,
 ) -> (Vec<Hopeful<'a>>, Vec<Hopeful<'a>>) {
     let scored = readings.into_par_iter().filter_map(|(reading, region)| {
-        let mended = Mended::new(bench, &bench.input.few, &reading)?;
-        let score = mended.rough_score(bench, region);
+        let mended = Mended::new(context, &context.input.few, &reading)?;
+        let score = mended.rough_score(context, region);
         Some((score, (reading, region, mended)))
     });
     let mut scored: Vec<(f64, Hopeful<'a>)> = scored.collect();
@@ -346,7 +346,11 @@ struct Mended {
 }
 
 impl Mended {
-    fn new(bench: &Workbench<'_>, given: &PreparedCloud, reading: &Reading) -> Option<Mended> {
+    fn new(
+        context: &RegistrationContext<'_>,
+        given: &PreparedCloud,
+        reading: &Reading,
+    ) -> Option<Mended> {
         let matrix = &reading.matrix;
         let turn = matrix / reading.scale();
         let labels = match given.is_labelled() {
@@ -357,7 +361,7 @@ impl Mended {
         let cloud = SemanticCloud { points_m, labels };
         let cloud = PreparedCloud::new(cloud, &PrepareOptions::default()).ok()?;
         let cloud = cloud.with_normals(|i| given.normals().get(i).map(|n| turn * n));
-        let sensor_m = bench.input.sensor_m.map(|p| matrix * p);
+        let sensor_m = context.input.sensor_m.map(|p| matrix * p);
         Some(Mended { cloud, sensor_m })
     }
 
@@ -366,24 +370,24 @@ impl Mended {
     }
 
     /// Share of the full score at the best place of a rough search.
-    fn rough_score(&self, bench: &Workbench<'_>, region: Option<&Region>) -> f64 {
-        let found = search(&bench.map.rough, &self.source(), region, ROUGH_PLACES);
+    fn rough_score(&self, context: &RegistrationContext<'_>, region: Option<&Region>) -> f64 {
+        let found = search(&context.map.rough, &self.source(), region, ROUGH_PLACES);
         found.first().map_or(0.0, |hypothesis| hypothesis.score)
     }
 
     /// The best likelihood after a first look, as if it had as many regions as the cloud as it is, and the best poses.
     fn likelihood(
         &self,
-        bench: &Workbench<'_>,
+        context: &RegistrationContext<'_>,
         region: Option<&Region>,
         (places, looked_at): (usize, usize),
     ) -> Option<(f64, Vec<Isometry3<f64>>)> {
-        let hypotheses = search(&bench.map.surfaces, &self.source(), region, places);
-        let scale = bench.map.scale(bench.options.noise_m).coarser(2.0);
-        let fit = Fit::new(&self.cloud, &bench.map.cloud, scale);
-        let share = bench.few.observations() / fit.observations().max(1.0);
-        let mut found = bench.refine_best(&self.cloud, &hypotheses, looked_at, |pose| {
-            (self.likelihood_at(bench, &fit, &pose), pose)
+        let hypotheses = search(&context.map.surfaces, &self.source(), region, places);
+        let scale = context.map.scale(context.options.noise_m).coarser(2.0);
+        let fit = Fit::new(&self.cloud, &context.map.cloud, scale);
+        let share = context.few.observations() / fit.observations().max(1.0);
+        let mut found = context.refine_best(&self.cloud, &hypotheses, looked_at, |pose| {
+            (self.likelihood_at(context, &fit, &pose), pose)
         });
         found.truncate(CLOSELY);
         let best = found.first()?.0;
@@ -391,9 +395,14 @@ impl Mended {
         Some((share * best, poses.collect()))
     }
 
-    fn likelihood_at(&self, bench: &Workbench<'_>, fit: &Fit<'_>, pose: &Isometry3<f64>) -> f64 {
+    fn likelihood_at(
+        &self,
+        context: &RegistrationContext<'_>,
+        fit: &Fit<'_>,
+        pose: &Isometry3<f64>,
+    ) -> f64 {
         let partners = fit.partners(pose);
-        let (likelihood, _) = fit.likelihood(&partners, &bench.known, bench.options.agreement);
+        let (likelihood, _) = fit.likelihood(&partners, &context.known, context.options.agreement);
         likelihood.total()
     }
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::super::likelihood::region_of;
-use super::candidates::Workbench;
+use super::candidates::RegistrationContext;
 use super::rays::crossing_m;
 
 /// Fewest points of a region that says anything.
@@ -117,10 +117,13 @@ struct Shift {
 }
 
 /// Judges a pose by itself.
-pub(super) fn absolute_fit(bench: &Workbench<'_>, pose: &Isometry3<f64>) -> AbsoluteFit {
-    let regions = regions(bench, pose);
-    let scale = bench.map.scale(bench.options.noise_m);
-    let sigmas_m = (bench.options.noise_m, scale.normal_m);
+pub(super) fn absolute_fit(
+    context: &RegistrationContext<'_>,
+    pose: &Isometry3<f64>,
+) -> AbsoluteFit {
+    let regions = regions(context, pose);
+    let scale = context.map.scale(context.options.noise_m);
+    let sigmas_m = (context.options.noise_m, scale.normal_m);
     let (mut chi_square, mut held) = (0.0, 0_u32);
     let mut unexplained = Vec::new();
     for region in regions.values().filter(|r| r.points >= MIN_POINTS) {
@@ -142,11 +145,11 @@ pub(super) fn absolute_fit(bench: &Workbench<'_>, pose: &Isometry3<f64>) -> Abso
 }
 
 /// The regions that err together, in the order of their places in the cloud.
-fn regions(bench: &Workbench<'_>, pose: &Isometry3<f64>) -> BTreeMap<[i64; 3], Region> {
-    let (map, side_m) = (&bench.map.cloud, bench.options.region_m);
-    let gate_m = bench.map.scale(bench.options.noise_m).gate_m();
+fn regions(context: &RegistrationContext<'_>, pose: &Isometry3<f64>) -> BTreeMap<[i64; 3], Region> {
+    let (map, side_m) = (&context.map.cloud, context.options.region_m);
+    let gate_m = context.map.scale(context.options.noise_m).gate_m();
     let mut regions: BTreeMap<[i64; 3], Region> = BTreeMap::new();
-    for point in bench.input.full.points_m() {
+    for point in context.input.full.points_m() {
         let place = pose * point;
         let region = regions.entry(region_of(point, side_m)).or_default();
         region.points += 1;
@@ -159,12 +162,12 @@ fn regions(bench: &Workbench<'_>, pose: &Isometry3<f64>) -> BTreeMap<[i64; 3], R
             region.pull_m += n * n.dot(&(place - q));
         }
     }
-    let Some(sensor_m) = bench.input.sensor_m else {
+    let Some(sensor_m) = context.input.sensor_m else {
         return regions;
     };
-    let (from, occupied) = (pose * sensor_m, &bench.map.occupied);
-    let clear_m = CLEAR * bench.map.spacing_m;
-    for point in bench.input.few.points_m() {
+    let (from, occupied) = (pose * sensor_m, &context.map.occupied);
+    let clear_m = CLEAR * context.map.spacing_m;
+    for point in context.input.few.points_m() {
         let region = regions.entry(region_of(point, side_m)).or_default();
         let place = pose * point;
         let length = nalgebra::distance(&from, &place);

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::super::search::{Region, SearchSource, angle_between, search, yaw_of};
-use super::candidates::{Candidate, FEW_STEPS, Workbench};
+use super::candidates::{Candidate, FEW_STEPS, RegistrationContext};
 use super::likeliest;
 
 /// Rivals from among the candidates that are refined like the likeliest.
@@ -23,7 +23,7 @@ const ANYWHERE_M: f64 = 1e6;
 /// Log-likelihood of an observation by which a rival is beyond reach: refining it wins less.
 const BEYOND: f64 = 1.0;
 
-impl Workbench<'_> {
+impl RegistrationContext<'_> {
     /// The likeliest candidate, its best rivals, and its twins in a symmetric room, all refined with near
     /// partners only, which leaves out what one of the clouds has not seen, and moved along what surfaces leave weak.
     ///

@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::candidates::Workbench;
+use super::candidates::RegistrationContext;
 use super::input::Input;
 use super::judge::is_held;
 use super::map::CalibrationMap;
@@ -48,12 +48,12 @@ pub fn track(
             rmse_m: 0.0,
         };
     };
-    let bench = Workbench::new(map, &input, options, None);
-    let old = bench.judge(&bench.fit, *target_from_source, "tracking");
-    let pose = bench.polish(target_from_source);
-    let new = bench.judge(&bench.fit, pose, "tracking");
+    let context = RegistrationContext::new(map, &input, options, None);
+    let old = context.judge(&context.fit, *target_from_source, "tracking");
+    let pose = context.polish(target_from_source);
+    let new = context.judge(&context.fit, pose, "tracking");
     let is_better = new.total() > old.total() + BETTER;
-    let best = match is_better && is_held(&bench, &new) {
+    let best = match is_better && is_held(&context, &new) {
         true => new,
         false => old,
     };
