@@ -9,7 +9,6 @@ mod candidates;
 mod cloud_statistics;
 mod covariance;
 mod input;
-mod judge;
 mod map;
 mod margin;
 mod probe;
@@ -21,6 +20,7 @@ mod rivals;
 mod scale;
 mod track;
 mod types;
+mod verdict;
 
 use std::ops::ControlFlow;
 
@@ -114,7 +114,7 @@ fn run(
     }
     step(progress, Stage::Judge, 0.9)?;
     let refined = Refined::of(&all);
-    let calibration = judge::answer(&context, all, request.start.is_some());
+    let calibration = verdict::select_and_classify(&context, all, request.start.is_some());
     let contradicted = calibration.fit.floating + calibration.fit.blocked;
     let in_doubt = contradicted > IN_DOUBT && calibration.verdict != Verdict::RejectedInput;
     let other = match options.trust_axes {

@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::PoseCovariance;
-use super::judge::covariance;
 use super::margin::SOFTNESS;
 use super::types::{DirectionKind, WeakDirection};
+use super::verdict::covariance;
 use crate::pose::se3;
 
 /// Standard deviation beyond which a direction is weak, as a share of the largest that is accepted.

@@ -4,9 +4,9 @@ use nalgebra::Isometry3;
 
 use super::candidates::RegistrationContext;
 use super::input::Input;
-use super::judge::is_held;
 use super::map::CalibrationMap;
 use super::types::{CalibrationOptions, CalibrationRequest, SourceCloud};
+use super::verdict::is_constrained;
 
 /// Log-likelihood by which a refined pose must be better to replace the old one.
 const BETTER: f64 = 2.0;
@@ -53,7 +53,7 @@ pub fn track(
     let pose = context.polish(target_from_source);
     let new = context.judge(&context.fit, pose, "tracking");
     let is_better = new.total() > old.total() + BETTER;
-    let best = match is_better && is_held(&context, &new) {
+    let best = match is_better && is_constrained(&context, &new) {
         true => new,
         false => old,
     };

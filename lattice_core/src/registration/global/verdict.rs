@@ -15,7 +15,7 @@ use super::types::{
 };
 
 /// Observations without a partner that one counts as whose line of sight the map contradicts.
-const CONTRADICTED: f64 = 3.0;
+const CONTRADICTION_PENALTY: f64 = 3.0;
 /// Candidates elsewhere that count, at most.
 const RIVALS: usize = 16;
 /// Largest ratio of the error of a region to its residuals.
@@ -39,12 +39,12 @@ const CLOSEST_M: f64 = 1e-3;
 const DISPLACE: f64 = 10.0;
 
 /// Chooses among candidates. With `started`, the first is what GICP makes of the start.
-pub(super) fn answer(
+pub(super) fn select_and_classify(
     context: &RegistrationContext<'_>,
     all: Vec<Candidate>,
     started: bool,
 ) -> Calibration {
-    let Some(best) = choose(context, &all, started) else {
+    let Some(best) = select(context, &all, started) else {
         return Calibration::refused(Verdict::NoOverlap, "no place was found");
     };
     let middle = context.middle();
@@ -76,11 +76,11 @@ pub(super) fn answer(
     let weak = covariance.as_ref().map(|sure| weak(context, sure, &pose));
     let weak = weak.unwrap_or_default();
     let held = covariance.is_some();
-    let (mut verdict, mut reason) = verdict(options, best, &margin, &fit, held, &weak);
+    let (mut verdict, mut reason) = classify(options, best, &margin, &fit, held, &weak);
     let scale = scale(context, best);
     if best.inlier_fraction >= options.min_inliers
-        && let Some(fault) = leaning(&pose, leans, options)
-            .or_else(|| misscaled(scale, context.fit.observations(), options))
+        && let Some(fault) = tilt_fault(&pose, leans, options)
+            .or_else(|| scale_fault(scale, context.fit.observations(), options))
     {
         (verdict, reason) = (Verdict::RejectedInput, fault);
     }
@@ -132,7 +132,7 @@ fn margin(
     let even = context.fit.even(&best.target_from_source, &poses, region_m);
     let ahead = |rival: &&Candidate| best.total() - rival.total().max(nowhere);
     let places = rivals.iter().map(ahead).zip(even);
-    let contradicted = CONTRADICTED * (fit.floating + fit.blocked);
+    let contradicted = CONTRADICTION_PENALTY * (fit.floating + fit.blocked);
     let unexplained = context.fit.observations() * (1.0 - best.inlier_fraction + contradicted);
     let margin = Margin::over(places, unexplained);
     margin.unwrap_or_else(|| Margin {
@@ -143,7 +143,7 @@ fn margin(
 }
 
 /// True if the surfaces hold a pose in all directions, as an answer must that is OK.
-pub(super) fn is_held(context: &RegistrationContext<'_>, candidate: &Candidate) -> bool {
+pub(super) fn is_constrained(context: &RegistrationContext<'_>, candidate: &Candidate) -> bool {
     let pose = &candidate.target_from_source;
     let sure = covariance(context, candidate);
     let sure = sure.and_then(|sure| sure.with_gravity(pose, context.options.gravity_sigma_rad));
@@ -162,7 +162,7 @@ fn weak(
 }
 
 /// Says that a pose does not stand upright, though both frames know where down is.
-fn leaning(pose: &Isometry3<f64>, leans: bool, options: &CalibrationOptions) -> Option<String> {
+fn tilt_fault(pose: &Isometry3<f64>, leans: bool, options: &CalibrationOptions) -> Option<String> {
     let angle_rad = (pose.rotation * Vector3::z()).angle(&Vector3::z());
     let beyond = leans && angle_rad > LEANING * options.gravity_sigma_rad;
     beyond.then(|| {
@@ -174,7 +174,7 @@ fn leaning(pose: &Isometry3<f64>, leans: bool, options: &CalibrationOptions) -> 
 }
 
 /// Says that the points are of another scale than the map.
-fn misscaled(
+fn scale_fault(
     scale: Option<ScaleEstimate>,
     observations: f64,
     options: &CalibrationOptions,
@@ -192,7 +192,7 @@ fn misscaled(
 }
 
 /// The likeliest, but what GICP makes of a start if that is the same place or nearly as likely.
-fn choose<'a>(
+fn select<'a>(
     context: &RegistrationContext<'_>,
     all: &'a [Candidate],
     started: bool,
@@ -219,7 +219,7 @@ fn choose<'a>(
     })
 }
 
-fn verdict(
+fn classify(
     options: &CalibrationOptions,
     best: &Candidate,
     margin: &Margin,
@@ -235,7 +235,7 @@ fn verdict(
         return (Verdict::NoOverlap, reason);
     }
     if fit.floating + fit.blocked > options.max_contradicted {
-        return (Verdict::NoOverlap, contradicted(fit, options));
+        return (Verdict::NoOverlap, contradiction(fit, options));
     }
     let (log, p_wrong) = (margin.log, margin.p_wrong());
     if p_wrong > options.max_p_wrong {
@@ -271,7 +271,7 @@ fn verdict(
 }
 
 /// Says that the map speaks against a pose.
-fn contradicted(fit: &AbsoluteFit, options: &CalibrationOptions) -> String {
+fn contradiction(fit: &AbsoluteFit, options: &CalibrationOptions) -> String {
     let [floating, blocked, most] =
         [fit.floating, fit.blocked, options.max_contradicted].map(|share| 100.0 * share);
     format!(
@@ -362,7 +362,7 @@ mod tests {
                 sigma: 0.02,
                 gain,
             };
-            misscaled(Some(estimate), 500.0, options).is_some()
+            scale_fault(Some(estimate), 500.0, options).is_some()
         };
         assert!(is_wrong(1.053, 300.0, &given) && is_wrong(0.9, 300.0, &given));
         // A bump of a warped mesh is explained a little better by a scale.
