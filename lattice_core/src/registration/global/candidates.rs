@@ -13,12 +13,12 @@ use super::rays::blocked_fraction;
 use super::types::CalibrationOptions;
 
 /// Steps of a first look, and those of them after which only the best go on.
-pub(super) const FEW_STEPS: usize = 7;
-const GLIMPSE_STEPS: usize = 3;
+pub(super) const COARSE_STEPS: usize = 7;
+const SCREENING_STEPS: usize = 3;
 /// Hypotheses that get all steps of a first look.
-const FIRST_LOOK: usize = 64;
+const SCREENED: usize = 64;
 /// Hypotheses that are refined with more points after a first look.
-const SECOND_LOOK: usize = 24;
+const COARSE_REFINED: usize = 24;
 /// Log-likelihood of an observation that refining a candidate may still win it.
 const HOPE: f64 = 0.5;
 /// Log-likelihood that a blocked line of sight costs an observation.
@@ -95,13 +95,13 @@ impl<'a> RegistrationContext<'a> {
 
     /// The hypotheses that stand a first look, refined with a few points, the best first and all
     /// different.
-    pub fn first_look(&self, hypotheses: &[Hypothesis]) -> Vec<Candidate> {
-        let found = self.refine_best(&self.input.few, hypotheses, FIRST_LOOK, |pose| {
+    pub fn coarse_refine(&self, hypotheses: &[Hypothesis]) -> Vec<Candidate> {
+        let found = self.refine_best(&self.input.few, hypotheses, SCREENED, |pose| {
             let candidate = self.judge(&self.few, pose, "search");
             (candidate.total(), candidate)
         });
         let found = found.into_iter().map(|(_, candidate)| candidate).collect();
-        self.different(found, SECOND_LOOK)
+        self.different(found, COARSE_REFINED)
     }
 
     /// Poses that the best `kept` hypotheses lead to, with their likelihoods, the best first: all of them are
@@ -113,22 +113,22 @@ impl<'a> RegistrationContext<'a> {
         kept: usize,
         judge: impl Fn(Isometry3<f64>) -> (f64, T) + Sync,
     ) -> Vec<(f64, T)> {
-        let glimpsed = hypotheses.par_iter().map(|hypothesis| {
-            let pose = self.refine_few(few, &hypothesis.target_from_source, GLIMPSE_STEPS);
+        let screened = hypotheses.par_iter().map(|hypothesis| {
+            let pose = self.refine_steps(few, &hypothesis.target_from_source, SCREENING_STEPS);
             (judge(pose).0, pose)
         });
-        let mut glimpsed: Vec<(f64, Isometry3<f64>)> = glimpsed.collect();
-        glimpsed.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let best = glimpsed.par_iter().take(kept);
-        let refined =
-            best.map(|(_, pose)| judge(self.refine_few(few, pose, FEW_STEPS - GLIMPSE_STEPS)));
+        let mut screened: Vec<(f64, Isometry3<f64>)> = screened.collect();
+        screened.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let best = screened.par_iter().take(kept);
+        let refined = best
+            .map(|(_, pose)| judge(self.refine_steps(few, pose, COARSE_STEPS - SCREENING_STEPS)));
         let mut refined: Vec<(f64, T)> = refined.collect();
         refined.sort_by(|a, b| b.0.total_cmp(&a.0));
         refined
     }
 
     /// The same candidates after some steps with more points, judged by all of them, the best first.
-    pub fn second_look(&self, first: &[Candidate]) -> Vec<Candidate> {
+    pub fn fine_refine(&self, first: &[Candidate]) -> Vec<Candidate> {
         let options = RegisterOptions {
             max_iterations: 8,
             source_stride: self.input.full.len().div_ceil(700),
@@ -147,7 +147,7 @@ impl<'a> RegistrationContext<'a> {
     }
 
     /// A few steps of GICP-SE(3) with a few points.
-    pub fn refine_few(
+    pub fn refine_steps(
         &self,
         few: &PreparedCloud,
         start: &Isometry3<f64>,

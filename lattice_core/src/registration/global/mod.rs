@@ -93,9 +93,9 @@ fn run(
     step(progress, Stage::Search, 0.3)?;
     hypotheses.extend(by_labels(&context, region.as_ref()));
     step(progress, Stage::Refine, 0.5)?;
-    let first = context.first_look(&hypotheses);
+    let first = context.coarse_refine(&hypotheses);
     step(progress, Stage::Refine, 0.6)?;
-    let second = context.second_look(&first);
+    let second = context.fine_refine(&first);
     step(progress, Stage::Refine, 0.7)?;
     let hopeful = second.first().map_or(0.0, Candidate::total) - context.hope();
     let mut all: Vec<Candidate> = second

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::super::search::{Region, SearchSource, angle_between, search, yaw_of};
-use super::candidates::{Candidate, FEW_STEPS, RegistrationContext};
+use super::candidates::{COARSE_STEPS, Candidate, RegistrationContext};
 use super::likeliest;
 
 /// Rivals from among the candidates that are refined like the likeliest.
@@ -100,8 +100,11 @@ impl RegistrationContext<'_> {
                 false => Vec::new(),
             };
             let looked_at = found.par_iter().map(|hypothesis| {
-                let pose =
-                    self.refine_few(&self.input.few, &hypothesis.target_from_source, FEW_STEPS);
+                let pose = self.refine_steps(
+                    &self.input.few,
+                    &hypothesis.target_from_source,
+                    COARSE_STEPS,
+                );
                 self.judge(&self.few, pose, "search")
             });
             likeliest(&looked_at.collect::<Vec<_>>())
