@@ -209,7 +209,11 @@ impl<'a> RegistrationContext<'a> {
     }
 
     /// Candidates from a pose: GICP-SE(3) and Semantic-ICP with what the labels taught so far.
-    pub fn portfolio(&self, start: &Isometry3<f64>, method: &'static str) -> Vec<Candidate> {
+    pub fn refine_with_all_methods(
+        &self,
+        start: &Isometry3<f64>,
+        method: &'static str,
+    ) -> Vec<Candidate> {
         let mut all = vec![self.judge(&self.fit, self.polish(start), method)];
         let labelled = self.input.full.is_labelled() && self.map.cloud.is_labelled();
         if labelled {

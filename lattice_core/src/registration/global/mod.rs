@@ -102,7 +102,7 @@ fn run(
         .par_iter()
         .take(FINALISTS)
         .filter(|c| c.total() >= hopeful)
-        .flat_map_iter(|c| context.portfolio(&c.target_from_source, "search"))
+        .flat_map_iter(|c| context.refine_with_all_methods(&c.target_from_source, "search"))
         .collect();
     all.extend(second);
     all.extend(context.contest(&all, region.as_ref()));
@@ -235,7 +235,7 @@ fn from_start(context: &RegistrationContext<'_>, start: &Isometry3<f64>) -> Vec<
     // As published, with its wide gate: it comes from farther than ours, and stands where it is right.
     let published = register(source, map, start, &RegisterOptions::gicp_se3());
     let mut all = vec![context.judge(&context.fit, published.target_from_source, "gicp")];
-    all.extend(context.portfolio(start, "gicp"));
+    all.extend(context.refine_with_all_methods(start, "gicp"));
     if source.is_labelled() && map.is_labelled() {
         let gate_m = (30.0 * context.map.spacing_m).max(1.0);
         let options = RegisterOptions {
