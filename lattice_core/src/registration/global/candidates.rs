@@ -20,7 +20,7 @@ const SCREENED: usize = 64;
 /// Hypotheses that are refined with more points after a first look.
 const COARSE_REFINED: usize = 24;
 /// Log-likelihood of an observation that refining a candidate may still win it.
-const HOPE: f64 = 0.5;
+const PRUNING_PER_OBSERVATION: f64 = 0.5;
 /// Log-likelihood that a blocked line of sight costs an observation.
 const BLOCKED_COST: f64 = 2.0;
 
@@ -176,19 +176,27 @@ impl<'a> RegistrationContext<'a> {
     }
 
     /// GICP-SE(3) with all points from a pose: what every candidate ends with.
-    pub fn polish(&self, start: &Isometry3<f64>) -> Isometry3<f64> {
+    pub fn refine_wide_gate(&self, start: &Isometry3<f64>) -> Isometry3<f64> {
         let options = self.baseline();
         register(&self.input.full, &self.map.cloud, start, &options).target_from_source
     }
 
     /// GICP-SE(3) of another cloud, at last with near partners only.
-    pub fn settled(&self, cloud: &PreparedCloud, start: &Isometry3<f64>) -> Isometry3<f64> {
-        let polished = register(cloud, &self.map.cloud, start, &self.baseline());
-        self.tighten(cloud, &polished.target_from_source)
+    pub fn refine_two_stage(
+        &self,
+        cloud: &PreparedCloud,
+        start: &Isometry3<f64>,
+    ) -> Isometry3<f64> {
+        let refined = register(cloud, &self.map.cloud, start, &self.baseline());
+        self.refine_narrow_gate(cloud, &refined.target_from_source)
     }
 
     /// GICP-SE(3) with near partners only.
-    pub fn tighten(&self, cloud: &PreparedCloud, start: &Isometry3<f64>) -> Isometry3<f64> {
+    pub fn refine_narrow_gate(
+        &self,
+        cloud: &PreparedCloud,
+        start: &Isometry3<f64>,
+    ) -> Isometry3<f64> {
         let options = RegisterOptions {
             gate_m: 4.0 * self.map.spacing_m,
             max_iterations: 24,
@@ -214,7 +222,7 @@ impl<'a> RegistrationContext<'a> {
         start: &Isometry3<f64>,
         method: &'static str,
     ) -> Vec<Candidate> {
-        let mut all = vec![self.judge(&self.fit, self.polish(start), method)];
+        let mut all = vec![self.judge(&self.fit, self.refine_wide_gate(start), method)];
         let labelled = self.input.full.is_labelled() && self.map.cloud.is_labelled();
         if labelled {
             let learned = all.first().map(|c| self.known.merged(&c.confusion));
@@ -226,8 +234,8 @@ impl<'a> RegistrationContext<'a> {
                 ..RegisterOptions::semantic_em(self.baseline().gate_m, LabelUse::Soft)
             };
             let pose = register(&self.input.full, &self.map.cloud, start, &options);
-            let polished = self.polish(&pose.target_from_source);
-            all.push(self.judge(&self.fit, polished, "semantic"));
+            let refined = self.refine_wide_gate(&pose.target_from_source);
+            all.push(self.judge(&self.fit, refined, "semantic"));
         }
         all
     }
@@ -264,8 +272,8 @@ impl<'a> RegistrationContext<'a> {
     }
 
     /// Log-likelihood that refining a candidate may still win it.
-    pub fn hope(&self) -> f64 {
-        HOPE * self.fit.observations()
+    pub fn pruning_threshold(&self) -> f64 {
+        PRUNING_PER_OBSERVATION * self.fit.observations()
     }
 
     /// Least distance, metres, and turn, radians, between answers that count as different.

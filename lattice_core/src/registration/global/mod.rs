@@ -97,11 +97,11 @@ fn run(
     step(progress, Stage::Refine, 0.6)?;
     let second = context.fine_refine(&first);
     step(progress, Stage::Refine, 0.7)?;
-    let hopeful = second.first().map_or(0.0, Candidate::total) - context.hope();
+    let least = second.first().map_or(0.0, Candidate::total) - context.pruning_threshold();
     let mut all: Vec<Candidate> = second
         .par_iter()
         .take(FINALISTS)
-        .filter(|c| c.total() >= hopeful)
+        .filter(|c| c.total() >= least)
         .flat_map_iter(|c| context.refine_with_all_methods(&c.target_from_source, "search"))
         .collect();
     all.extend(second);
@@ -244,8 +244,8 @@ fn from_start(context: &RegistrationContext<'_>, start: &Isometry3<f64>) -> Vec<
             ..RegisterOptions::class_wise_cauchy()
         };
         let pose = register(source, map, start, &options);
-        let polished = context.polish(&pose.target_from_source);
-        all.push(context.judge(&context.fit, polished, "class-wise"));
+        let refined = context.refine_wide_gate(&pose.target_from_source);
+        all.push(context.judge(&context.fit, refined, "class-wise"));
     }
     all
 }

@@ -169,7 +169,7 @@ impl Other {
         let share = observations / fit.observations().max(1.0);
         let density = observations * self.reading.scale().ln();
         let likelihoods = poses.par_iter().map(|pose| {
-            let pose = context.settled(&mended.cloud, pose);
+            let pose = context.refine_two_stage(&mended.cloud, pose);
             let likelihood = share * mended.likelihood_at(context, &fit, &pose) + density;
             let blocked = context.blocked(&mended.cloud, mended.sensor_m.as_ref(), &pose);
             Refined {
@@ -334,9 +334,9 @@ fn scored<'a>(
     let likely = scored
         .partition_point(|(score, _)| *score >= least)
         .min(most);
-    let mut hopeful: Vec<_> = scored.into_iter().map(|(_, hopeful)| hopeful).collect();
-    let rest = hopeful.split_off(likely);
-    (hopeful, rest)
+    let mut ranked: Vec<_> = scored.into_iter().map(|(_, one)| one).collect();
+    let rest = ranked.split_off(likely);
+    (ranked, rest)
 }
 
 /// A cloud by another reading.

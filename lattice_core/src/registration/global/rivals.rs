@@ -39,13 +39,13 @@ impl RegistrationContext<'_> {
         let twins = self.twins(best, region);
         places.extend(twins.into_iter().map(|pose| (pose, "search")));
         let refined = places.par_iter().map(|(pose, method)| {
-            let tight = self.tighten(&self.input.full, pose);
+            let tight = self.refine_narrow_gate(&self.input.full, pose);
             self.judge(&self.fit, tight, method)
         });
         let refined: Vec<Candidate> = refined.collect();
-        let least = likeliest(&refined).map_or(0.0, Candidate::total) - self.hope();
-        let hopeful = refined.into_par_iter().filter(|c| c.total() > least);
-        hopeful.map(|candidate| self.climbed(candidate)).collect()
+        let least = likeliest(&refined).map_or(0.0, Candidate::total) - self.pruning_threshold();
+        let kept = refined.into_par_iter().filter(|c| c.total() > least);
+        kept.map(|candidate| self.climbed(candidate)).collect()
     }
 
     /// The likeliest candidates elsewhere, at most so many, one of each place, the likeliest first.
@@ -80,7 +80,7 @@ impl RegistrationContext<'_> {
     fn twins(&self, best: &Candidate, region: Option<&Region>) -> Vec<Isometry3<f64>> {
         let source = SearchSource::by_surface(&self.input.few, self.input.sensor_m);
         let best_of_few = self.judge(&self.few, best.target_from_source, best.method);
-        let hopeful = best_of_few.total() - BEYOND * self.few.observations();
+        let least = best_of_few.total() - BEYOND * self.few.observations();
         let twin = |turn_rad: &f64| {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), *turn_rad);
             let about = Isometry3::from_parts(
@@ -108,8 +108,8 @@ impl RegistrationContext<'_> {
                 self.judge(&self.few, pose, "search")
             });
             likeliest(&looked_at.collect::<Vec<_>>())
-                .filter(|twin| twin.total() > hopeful)
-                .map(|twin| self.polish(&twin.target_from_source))
+                .filter(|twin| twin.total() > least)
+                .map(|twin| self.refine_wide_gate(&twin.target_from_source))
         };
         TWINS_RAD.par_iter().filter_map(twin).collect()
     }

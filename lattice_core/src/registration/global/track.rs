@@ -50,7 +50,7 @@ pub fn track(
     };
     let context = RegistrationContext::new(map, &input, options, None);
     let old = context.judge(&context.fit, *target_from_source, "tracking");
-    let pose = context.polish(target_from_source);
+    let pose = context.refine_wide_gate(target_from_source);
     let new = context.judge(&context.fit, pose, "tracking");
     let is_better = new.total() > old.total() + BETTER;
     let best = match is_better && is_constrained(&context, &new) {
