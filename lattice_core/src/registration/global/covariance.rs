@@ -166,13 +166,13 @@ impl PoseCovariance {
     }
 
     /// As wide as it takes for another pose to be that probable.
-    pub fn with_rival(
+    pub fn with_alternative(
         self,
         pose: &Isometry3<f64>,
-        rival: &Isometry3<f64>,
+        alternative: &Isometry3<f64>,
         probability: f64,
     ) -> PoseCovariance {
-        let off = se3::log(&(pose.inverse() * rival));
+        let off = se3::log(&(pose.inverse() * alternative));
         // Variance of a choice between the two.
         let spread = probability * (1.0 - probability) * off * off.transpose();
         // Rivals of one kind come many times: the widest counts, not their sum.

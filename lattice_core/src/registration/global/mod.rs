@@ -5,6 +5,7 @@
 //! far as they predict each other on parts of the view they were not learned from. GICP-SE(3) from a
 //! given start stands unless another pose is clearly better.
 
+mod alternatives;
 mod candidates;
 mod cloud_statistics;
 mod covariance;
@@ -16,7 +17,6 @@ mod profile;
 mod rays;
 mod readings;
 mod regions;
-mod rivals;
 mod scale;
 mod track;
 mod types;
@@ -105,7 +105,7 @@ fn run(
         .flat_map_iter(|c| context.refine_with_all_methods(&c.target_from_source, "search"))
         .collect();
     all.extend(second);
-    all.extend(context.contest(&all, region.as_ref()));
+    all.extend(context.search_alternatives(&all, region.as_ref()));
     if let Some(start) = &request.start {
         // The first of all is what GICP alone would answer.
         let mut from_start = from_start(&context, start);

@@ -17,7 +17,7 @@ use super::types::{
 /// Observations without a partner that one counts as whose line of sight the map contradicts.
 const CONTRADICTION_PENALTY: f64 = 3.0;
 /// Candidates elsewhere that count, at most.
-const RIVALS: usize = 16;
+const MAX_ALTERNATIVES: usize = 16;
 /// Largest ratio of the error of a region to its residuals.
 const INVISIBLE: f64 = 4.0;
 /// Extent of a cloud over the root mean square distance of its points from their midst, about.
@@ -56,9 +56,11 @@ pub(super) fn select_and_classify(
         let near = all
             .iter()
             .filter(|c| c.is_near(&pose, &middle, shift_m, turn_rad));
-        near.fold(context.probed(best, surfaces), |sure, rival| {
-            let odds = ((rival.total() - best.total()) / SOFTNESS).exp().min(1.0);
-            sure.with_rival(&pose, &rival.target_from_source, odds / (1.0 + odds))
+        near.fold(context.probed(best, surfaces), |sure, alternative| {
+            let odds = ((alternative.total() - best.total()) / SOFTNESS)
+                .exp()
+                .min(1.0);
+            sure.with_alternative(&pose, &alternative.target_from_source, odds / (1.0 + odds))
         })
     });
     // Both frames know where down is; but what GICP made of a start stands as it is.
@@ -121,17 +123,17 @@ fn margin(
     fit: &AbsoluteFit,
 ) -> Margin {
     let nowhere = context.fit.nowhere();
-    let mut rivals = context.rivals(all, best, RIVALS);
+    let mut alternatives = context.alternatives(all, best, MAX_ALTERNATIVES);
     // The chances of those that are far behind matter only if there are no others.
-    let within_reach = rivals
+    let competitive = alternatives
         .iter()
-        .filter(|rival| context.is_within_reach(rival, best));
-    rivals.truncate(within_reach.count().max(1));
-    let poses: Vec<&Isometry3<f64>> = rivals.iter().map(|c| &c.target_from_source).collect();
+        .filter(|alternative| context.is_competitive(alternative, best));
+    alternatives.truncate(competitive.count().max(1));
+    let poses: Vec<&Isometry3<f64>> = alternatives.iter().map(|c| &c.target_from_source).collect();
     let region_m = context.options.region_m;
     let even = context.fit.even(&best.target_from_source, &poses, region_m);
-    let ahead = |rival: &&Candidate| best.total() - rival.total().max(nowhere);
-    let places = rivals.iter().map(ahead).zip(even);
+    let ahead = |alternative: &&Candidate| best.total() - alternative.total().max(nowhere);
+    let places = alternatives.iter().map(ahead).zip(even);
     let contradicted = CONTRADICTION_PENALTY * (fit.floating + fit.blocked);
     let unexplained = context.fit.observations() * (1.0 - best.inlier_fraction + contradicted);
     let margin = Margin::over(places, unexplained);
