@@ -63,14 +63,14 @@ impl RegistrationContext<'_> {
         best: &'a Candidate,
         most: usize,
     ) -> Vec<&'a Candidate> {
-        let middle = self.middle();
+        let centroid = self.centroid();
         let (shift_m, turn_rad) = self.least_difference();
         let mut sorted: Vec<&Candidate> = all.iter().collect();
         sorted.sort_by(|a, b| b.total().total_cmp(&a.total()));
         let mut kept = vec![best];
         for candidate in sorted {
             let near = |other: &&Candidate| {
-                other.is_near(&candidate.target_from_source, &middle, shift_m, turn_rad)
+                other.is_near(&candidate.target_from_source, &centroid, shift_m, turn_rad)
             };
             if kept.len() <= most && !kept.iter().any(near) {
                 kept.push(candidate);

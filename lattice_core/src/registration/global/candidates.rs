@@ -53,12 +53,12 @@ impl Candidate {
     pub fn is_near(
         &self,
         other: &Isometry3<f64>,
-        middle: &Point3<f64>,
+        centroid: &Point3<f64>,
         shift_m: f64,
         turn_rad: f64,
     ) -> bool {
         let pose = &self.target_from_source;
-        nalgebra::distance(&(pose * middle), &(other * middle)) < shift_m
+        nalgebra::distance(&(pose * centroid), &(other * centroid)) < shift_m
             && pose.rotation.angle_to(&other.rotation) < turn_rad
     }
 }
@@ -163,11 +163,11 @@ impl<'a> RegistrationContext<'a> {
 
     /// The first of each place.
     pub fn different(&self, candidates: Vec<Candidate>, most: usize) -> Vec<Candidate> {
-        let middle = self.middle();
+        let centroid = self.centroid();
         let mut kept: Vec<Candidate> = Vec::new();
         for candidate in candidates {
             let pose = &candidate.target_from_source;
-            let near = |other: &Candidate| other.is_near(pose, &middle, self.map.spacing_m, 0.02);
+            let near = |other: &Candidate| other.is_near(pose, &centroid, self.map.spacing_m, 0.02);
             if kept.len() < most && !kept.iter().any(near) {
                 kept.push(candidate);
             }
@@ -282,7 +282,7 @@ impl<'a> RegistrationContext<'a> {
     }
 
     /// The midst of the headset's points, in its frame.
-    pub fn middle(&self) -> Point3<f64> {
+    pub fn centroid(&self) -> Point3<f64> {
         let points = self.input.few.points_m();
         let sum: Vector3<f64> = points.iter().map(|p| p.coords).sum();
         (sum / points.len().max(1) as f64).into()

@@ -62,8 +62,8 @@ fn cells(scan: &SourceCloud, stride: usize) -> Vec<Cell> {
     let usable = |p: &&Point3<f64>| p.iter().all(|c| c.abs() <= FARTHEST_M);
     let points = || scan.cloud.points_m.iter().step_by(stride).filter(usable);
     let sum = points().fold(Vector3::zeros(), |sum, p| sum + p.coords);
-    let middle = Point3::from(sum / (points().count().max(1)) as f64);
-    let from = scan.sensor_m.unwrap_or(middle);
+    let centroid = Point3::from(sum / (points().count().max(1)) as f64);
+    let from = scan.sensor_m.unwrap_or(centroid);
     let mut cells: FxHashMap<[i32; 3], Cell> = FxHashMap::default();
     for point in points() {
         let key = [point.x, point.y, point.z].map(|c| (c / CELL_M).floor() as i32);
@@ -85,8 +85,8 @@ impl Cell {
         if self.points < LEAST {
             return None;
         }
-        let middle = self.sum_m / self.points;
-        let spread = self.squares / self.points - middle * middle.transpose();
+        let centroid = self.sum_m / self.points;
+        let spread = self.squares / self.points - centroid * centroid.transpose();
         Some(spread.symmetric_eigenvalues().min().max(0.0).sqrt())
     }
 }

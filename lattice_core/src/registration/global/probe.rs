@@ -74,13 +74,13 @@ impl RegistrationContext<'_> {
         candidate: &Candidate,
         surfaces: &PoseCovariance,
     ) -> Vec<(WeakDirection, Direction)> {
-        let (pose, middle) = (&candidate.target_from_source, self.middle());
+        let (pose, centroid) = (&candidate.target_from_source, self.centroid());
         let upright = surfaces.with_gravity(pose, self.options.gravity_sigma_rad);
         let held = upright.as_ref().unwrap_or(surfaces);
-        let mut weak = held.directions(pose, &middle);
+        let mut weak = held.directions(pose, &centroid);
         weak.retain(|d| d.sigma > WEAK * self.options.max_sigma(d.kind));
         weak.truncate(MEASURED);
-        let direction = |weak: WeakDirection| (weak, Direction::new(&weak, pose, &middle, held));
+        let direction = |weak: WeakDirection| (weak, Direction::new(&weak, pose, &centroid, held));
         weak.into_iter().map(direction).collect()
     }
 
@@ -111,8 +111,8 @@ impl RegistrationContext<'_> {
 
     /// Root mean square distance of the headset's points from their midst, metres.
     pub fn reach_m(&self) -> f64 {
-        let (middle, points): (Point3<f64>, _) = (self.middle(), self.input.few.points_m());
-        let sum: f64 = points.iter().map(|p| (p - middle).norm_squared()).sum();
+        let (centroid, points): (Point3<f64>, _) = (self.centroid(), self.input.few.points_m());
+        let sum: f64 = points.iter().map(|p| (p - centroid).norm_squared()).sum();
         (sum / points.len().max(1) as f64)
             .sqrt()
             .max(self.map.spacing_m)
@@ -196,17 +196,17 @@ mod tests {
     #[test]
     fn a_measurement_tells_the_direction_that_was_weak() {
         let pose = Isometry3::new(Vector3::new(1.0, 2.0, 0.0), Vector3::z());
-        let middle = Point3::new(2.0, 0.5, 0.0);
+        let centroid = Point3::new(2.0, 0.5, 0.0);
         let loose = PoseCovariance {
             at_source: Matrix6::identity() * 1e-4
                 + Matrix6::from_diagonal(&Vector6::new(0.0, 4.0, 0.0, 0.0, 0.0, 0.0)),
         };
-        let weak = loose.directions(&pose, &middle)[0];
+        let weak = loose.directions(&pose, &centroid)[0];
         assert!((weak.sigma - 2.0).abs() < 1e-3);
-        let direction = Direction::new(&weak, &pose, &middle, &loose);
+        let direction = Direction::new(&weak, &pose, &centroid, &loose);
         assert!(((direction.lever * direction.motion)[0] - 1.0).abs() < 1e-9);
         let told = loose.measured(&direction, 0.01 * 0.01);
-        let after = told.directions(&pose, &middle);
+        let after = told.directions(&pose, &centroid);
         assert!(after[0].sigma < 0.03);
     }
 

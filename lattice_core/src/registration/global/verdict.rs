@@ -47,7 +47,7 @@ pub(super) fn select_and_classify(
     let Some(best) = select(context, &all, started) else {
         return Calibration::refused(Verdict::NoOverlap, "no place was found");
     };
-    let middle = context.middle();
+    let centroid = context.centroid();
     let (shift_m, turn_rad) = context.least_difference();
     let pose = best.target_from_source;
     let fit = absolute_fit(context, &pose);
@@ -55,7 +55,7 @@ pub(super) fn select_and_classify(
     let covariance = covariance(context, best).map(|surfaces| {
         let near = all
             .iter()
-            .filter(|c| c.is_near(&pose, &middle, shift_m, turn_rad));
+            .filter(|c| c.is_near(&pose, &centroid, shift_m, turn_rad));
         near.fold(context.probed(best, surfaces), |sure, alternative| {
             let odds = ((alternative.total() - best.total()) / SOFTNESS)
                 .exp()
@@ -122,7 +122,7 @@ fn margin(
     best: &Candidate,
     fit: &AbsoluteFit,
 ) -> Margin {
-    let nowhere = context.fit.nowhere();
+    let outlier = context.fit.outlier_log_likelihood();
     let mut alternatives = context.alternatives(all, best, MAX_ALTERNATIVES);
     // The chances of those that are far behind matter only if there are no others.
     let competitive = alternatives
@@ -132,13 +132,13 @@ fn margin(
     let poses: Vec<&Isometry3<f64>> = alternatives.iter().map(|c| &c.target_from_source).collect();
     let region_m = context.options.region_m;
     let even = context.fit.even(&best.target_from_source, &poses, region_m);
-    let ahead = |alternative: &&Candidate| best.total() - alternative.total().max(nowhere);
+    let ahead = |alternative: &&Candidate| best.total() - alternative.total().max(outlier);
     let places = alternatives.iter().map(ahead).zip(even);
     let contradicted = CONTRADICTION_PENALTY * (fit.floating + fit.blocked);
     let unexplained = context.fit.observations() * (1.0 - best.inlier_fraction + contradicted);
     let margin = Margin::over(places, unexplained);
     margin.unwrap_or_else(|| Margin {
-        log: best.total() - nowhere,
+        log: best.total() - outlier,
         unexplained,
         ..Margin::default()
     })
@@ -158,7 +158,7 @@ fn weak(
     covariance: &PoseCovariance,
     pose: &Isometry3<f64>,
 ) -> Vec<WeakDirection> {
-    let mut directions = covariance.directions(pose, &context.middle());
+    let mut directions = covariance.directions(pose, &context.centroid());
     directions.retain(|d| d.sigma > context.options.max_sigma(d.kind));
     directions
 }
@@ -207,7 +207,7 @@ fn select<'a>(
     let (shift_m, turn_rad) = (3.0 * context.map.spacing_m, 0.09);
     let beside = gicp.is_near(
         &best.target_from_source,
-        &context.middle(),
+        &context.centroid(),
         shift_m,
         turn_rad,
     );
@@ -328,7 +328,7 @@ fn error_model(context: &RegistrationContext<'_>, best: &Candidate) -> ErrorMode
         point_m: best.rmse_m,
         spacing_m: context.map.spacing_m,
         scale_sigma: options.scale_sigma,
-        center: context.input.sensor_m.unwrap_or_else(|| context.middle()),
+        center: context.input.sensor_m.unwrap_or_else(|| context.centroid()),
         gate_m: 6.0 * context.map.spacing_m,
     }
 }

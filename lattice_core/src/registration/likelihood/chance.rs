@@ -88,8 +88,8 @@ fn even(cells: &[(f64, f64)]) -> f64 {
 /// Standard deviation of the difference of the log-likelihoods of two poses, given those of regions.
 fn noise(regions: &[(f64, f64)]) -> f64 {
     let mut differences: Vec<f64> = on_both(regions).collect();
-    let middle = quantile(&mut differences, 0.5);
-    let mut deviations: Vec<f64> = differences.iter().map(|d| (d - middle).abs()).collect();
+    let median = quantile(&mut differences, 0.5);
+    let mut deviations: Vec<f64> = differences.iter().map(|d| (d - median).abs()).collect();
     let most = HEAVY * DEVIATION_OF_MEDIAN * quantile(&mut deviations, 0.5);
     let squared: f64 = deviations.iter().map(|d| d.min(most).powi(2)).sum();
     let n = deviations.len() as f64;

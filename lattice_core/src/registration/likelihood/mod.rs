@@ -120,7 +120,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Log-likelihood of a pose that puts no point near the target.
-    pub fn nowhere(&self) -> f64 {
+    pub fn outlier_log_likelihood(&self) -> f64 {
         self.observations() * log_density(0.0)
     }
 
@@ -182,7 +182,7 @@ impl<'a> Fit<'a> {
 
     /// Log-likelihood by surfaces at each of the [`CLOSENESS`].
     fn by_surfaces(&self, partners: &Partners) -> [f64; CLOSENESS.len()] {
-        let nowhere = log_density(0.0);
+        let outlier = log_density(0.0);
         let mut sums = [0.0; CLOSENESS.len()];
         for (near, weight) in partners.of_point.iter().zip(&self.weights) {
             let mut nearness = [0.0; CLOSENESS.len()];
@@ -194,7 +194,7 @@ impl<'a> Fit<'a> {
                 if widest > 0.0 {
                     log_density(n)
                 } else {
-                    nowhere
+                    outlier
                 }
             };
             for (sum, nearness) in sums.iter_mut().zip(nearness) {
