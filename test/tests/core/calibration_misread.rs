@@ -113,7 +113,7 @@ fn no_other_axes_are_tried_of_a_cloud_whose_axes_are_trusted() {
     let [checked, found] = [given, trusted].map(|options| scene.ask(&options, |p| p));
     assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
     assert_eq!(found.target_from_source, checked.target_from_source);
-    assert_eq!(found.other_reading_ahead, None);
+    assert_eq!(found.axis_hypothesis_lead, None);
     let mirror = |p: Vector3<f64>| Vector3::new(p.x, -p.y, p.z);
     let found = scene.ask(&trusted, mirror);
     assert!(!found.reason.contains("mirrored"), "{}", found.reason);

@@ -9,7 +9,7 @@ use super::super::{PrepareOptions, PreparedCloud, RegistrationError, SemanticClo
 pub struct CalibrationMap {
     pub(super) cloud: PreparedCloud,
     pub(super) surfaces: SearchMap,
-    /// The same with cells twice as large, for a look at readings that are hardly right.
+    /// The same with cells twice as large, for a look at hypotheses that are hardly right.
     pub(super) rough: SearchMap,
     pub(super) occupied: OccupiedGrid,
     pub(super) spacing_m: f64,

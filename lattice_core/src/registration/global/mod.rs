@@ -6,6 +6,7 @@
 //! given start stands unless another pose is clearly better.
 
 mod alternatives;
+mod axis_hypotheses;
 mod candidates;
 mod cloud_statistics;
 mod covariance;
@@ -15,7 +16,6 @@ mod margin;
 mod probe;
 mod profile;
 mod rays;
-mod readings;
 mod regions;
 mod scale;
 mod track;
@@ -29,9 +29,9 @@ use rayon::prelude::*;
 
 use super::search::{Hypothesis, Region, SearchMap, SearchSource, search};
 use super::{LabelDistribution, PreparedCloud, RegisterOptions, register};
+use axis_hypotheses::{BestHypothesis, Refined, best_axis_hypothesis};
 use candidates::{Candidate, RegistrationContext};
 use input::Input;
-use readings::{Other, Refined, other_reading};
 use types::Refusal;
 
 pub use map::CalibrationMap;
@@ -119,7 +119,7 @@ fn run(
     let in_doubt = contradicted > IN_DOUBT && calibration.verdict != Verdict::RejectedInput;
     let other = match options.trust_axes {
         true => None,
-        false => other_reading(&context, &first, refined, in_doubt, region.as_ref()),
+        false => best_axis_hypothesis(&context, &first, refined, in_doubt, region.as_ref()),
     };
     let _ = progress.report(Stage::Judge, 1.0);
     Ok(match other {
@@ -128,17 +128,21 @@ fn run(
     })
 }
 
-/// The answer when another reading of the cloud was looked at.
-fn read_as(found: Calibration, other: &Other, options: &CalibrationOptions) -> Calibration {
+/// The answer when another hypothesis of the cloud was looked at.
+fn read_as(
+    found: Calibration,
+    other: &BestHypothesis,
+    options: &CalibrationOptions,
+) -> Calibration {
     let found = Calibration {
-        other_reading_ahead: Some(other.ahead),
+        axis_hypothesis_lead: Some(other.ahead),
         ..found
     };
-    let reason = || other.reading.reason(options.axes);
+    let reason = || other.hypothesis.reason(options.axes);
     match found.verdict {
         // What leans fits better at another scale, and what is of another scale often leans: both are told.
-        Verdict::RejectedInput if other.reading.is_scaled() => Calibration {
-            reason: match other.is_certain && !found.is_about(other.reading.scale()) {
+        Verdict::RejectedInput if other.hypothesis.is_scaled() => Calibration {
+            reason: match other.is_certain && !found.is_about(other.hypothesis.scale()) {
                 true => format!("{}; or it {}", found.reason, reason()),
                 false => found.reason,
             },
@@ -147,8 +151,8 @@ fn read_as(found: Calibration, other: &Other, options: &CalibrationOptions) -> C
         _ if other.is_certain => Calibration {
             verdict: Verdict::RejectedInput,
             reason: format!("the cloud {}", reason()),
-            scale: match other.reading.is_scaled() {
-                true => Some(ScaleEstimate::about(other.reading.scale())),
+            scale: match other.hypothesis.is_scaled() {
+                true => Some(ScaleEstimate::about(other.hypothesis.scale())),
                 false => found.scale,
             },
             ..found

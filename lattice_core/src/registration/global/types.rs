@@ -216,7 +216,7 @@ pub struct Calibration {
     pub fit: AbsoluteFit,
     /// Log-likelihood by which other axes or another unit of the cloud are ahead after a first look; None if a rough
     /// one was enough.
-    pub other_reading_ahead: Option<f64>,
+    pub axis_hypothesis_lead: Option<f64>,
     /// Share of the headset's points on a surface of the map.
     pub inlier_fraction: f64,
     /// Root mean square distance of those from the surfaces, metres.
@@ -243,7 +243,7 @@ impl Calibration {
             scale: None,
             margin: Margin::default(),
             fit: AbsoluteFit::default(),
-            other_reading_ahead: None,
+            axis_hypothesis_lead: None,
             inlier_fraction: 0.0,
             rmse_m: 0.0,
             weak_directions: Vec::new(),

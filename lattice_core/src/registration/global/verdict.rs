@@ -101,7 +101,7 @@ pub(super) fn select_and_classify(
         covariance: covariance.map_or_else(Matrix6::zeros, |c| c.in_target(&pose)),
         margin,
         fit,
-        other_reading_ahead: None,
+        axis_hypothesis_lead: None,
         inlier_fraction: best.inlier_fraction,
         rmse_m: best.rmse_m,
         weak_directions: weak,

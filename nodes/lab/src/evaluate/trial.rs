@@ -177,7 +177,7 @@ impl Trial {
                     .scale
                     .map(|s| (rounded(s.scale), rounded(s.sigma))),
                 scale_gain: calibration.scale.map(|s| rounded(s.gain)),
-                other_reading_ahead: calibration.other_reading_ahead.map(rounded),
+                other_reading_ahead: calibration.axis_hypothesis_lead.map(rounded),
                 fit: Some((
                     rounded(fit.chi_square),
                     rounded(fit.floating),

@@ -17,40 +17,40 @@ const SCALED_PLACES: (usize, usize) = (128, 64);
 const ROUGH_PLACES: usize = 4;
 /// Readings that are looked at: the right one and its mirror image lead a rough search.
 const LOOKED_AT: usize = 2;
-/// The best readings that are looked at closely where the cloud as it is is in doubt.
+/// The best hypotheses that are looked at closely where the cloud as it is is in doubt.
 const DOUBTED: usize = 4;
-/// Poses of a reading that are looked at with all points.
+/// Poses of a hypothesis that are looked at with all points.
 const CLOSELY: usize = 4;
 /// Scales that a cloud may have instead of 1; what is nearer to 1 is estimated with the pose.
 const SCALES: [f64; 4] = [0.8, 0.9, 1.11, 1.25];
 /// Score by which a scale must be ahead in a rough search to be looked at closely: a scale that is wrong is behind
 /// in all but bare views.
 const SCALED_AHEAD: f64 = 0.02;
-/// Log-likelihood by which a reading is certainly better.
+/// Log-likelihood by which a hypothesis is certainly better.
 const MARGIN: f64 = 40.0;
-/// Log-likelihood by which a reading must be behind to be out of the question: where one cloud in fifty is misread,
+/// Log-likelihood by which a hypothesis must be behind to be out of the question: where one cloud in fifty is misread,
 /// that is a probability of one in a hundred.
 const NOT_BEHIND: f64 = 4.0;
-/// Score by which a right reading may fall behind a wrong one in it.
+/// Score by which a right hypothesis may fall behind a wrong one in it.
 const ROUGH: f64 = 0.03;
 
 /// Axes or unit that a cloud may have instead of forward, left, up in metres.
 ///
 /// Turns about the vertical are searched anyway, so the axis that points up and the handedness tell all.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Reading {
+pub(super) struct AxisHypothesis {
     /// The matrix that mends the points.
     matrix: Matrix3<f64>,
 }
 
-impl Reading {
+impl AxisHypothesis {
     /// One axis has the wrong sign.
-    const MIRRORED: Reading = Reading {
+    const MIRRORED: AxisHypothesis = AxisHypothesis {
         matrix: Matrix3::new(1., 0., 0., 0., -1., 0., 0., 0., 1.),
     };
 
     /// All that turn the vertical, of both hands.
-    fn on_their_side() -> Vec<Reading> {
+    fn on_their_side() -> Vec<AxisHypothesis> {
         let signed = |i: usize| [1.0, -1.0].map(|sign| (i, sign));
         let up = (0..3).flat_map(signed).filter(|up| *up != (2, 1.0));
         let hands = |(i, sign): (usize, f64)| {
@@ -59,15 +59,15 @@ impl Reading {
                 let (up, forward) = (sign * unit(i), unit(i + 1));
                 let left = hand * up.cross(&forward);
                 let matrix = Matrix3::from_columns(&[forward, left, up]).transpose();
-                Reading { matrix }
+                AxisHypothesis { matrix }
             })
         };
         up.flat_map(hands).collect()
     }
 
     /// Lengths are to be multiplied by a factor.
-    fn scaled(by: f64) -> Reading {
-        Reading {
+    fn scaled(by: f64) -> AxisHypothesis {
+        AxisHypothesis {
             matrix: Matrix3::identity() * by,
         }
     }
@@ -88,7 +88,7 @@ impl Reading {
         same_up && self.matrix.determinant() * matrix.determinant() > 0.0
     }
 
-    /// The reading in words, for a cloud that was read as one of `axes`.
+    /// The hypothesis in words, for a cloud that was read as one of `axes`.
     pub fn reason(&self, axes: Axes) -> String {
         if self.is_scaled() {
             return format!(
@@ -126,23 +126,28 @@ impl Reading {
     }
 }
 
-/// Another reading of a cloud, the best of those that were looked at closely.
+/// Another hypothesis of a cloud, the best of those that were looked at closely.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Other {
-    pub reading: Reading,
+pub(super) struct BestHypothesis {
+    pub hypothesis: AxisHypothesis,
     /// Log-likelihood by which it is ahead of the cloud as it is: of few points, or of all if it is possible by these.
     pub ahead: f64,
     /// True if it is beyond doubt.
     pub is_certain: bool,
 }
 
-impl Other {
-    /// A reading with a likelihood, beside that of the cloud as it is.
-    fn new(reading: Reading, likelihood: f64, as_it_is: f64, observations: f64) -> Other {
+impl BestHypothesis {
+    /// A hypothesis with a likelihood, beside that of the cloud as it is.
+    fn new(
+        hypothesis: AxisHypothesis,
+        likelihood: f64,
+        as_it_is: f64,
+        observations: f64,
+    ) -> BestHypothesis {
         let ahead = likelihood - as_it_is;
         let is_clear = ahead > MARGIN.max(0.25 * observations);
-        Other {
-            reading,
+        BestHypothesis {
+            hypothesis,
             ahead,
             is_certain: is_clear && likelihood > 0.5 * observations,
         }
@@ -161,25 +166,27 @@ impl Other {
         context: &RegistrationContext<'_>,
         poses: &[Isometry3<f64>],
         refined: Refined,
-    ) -> Option<Other> {
-        let mended = Mended::new(context, &context.input.full, &self.reading)?;
+    ) -> Option<BestHypothesis> {
+        let reinterpreted =
+            ReinterpretedCloud::new(context, &context.input.full, &self.hypothesis)?;
         let scale = context.map.scale(context.options.noise_m);
-        let fit = Fit::new(&mended.cloud, &context.map.cloud, scale);
+        let fit = Fit::new(&reinterpreted.cloud, &context.map.cloud, scale);
         let observations = context.fit.observations();
         let share = observations / fit.observations().max(1.0);
-        let density = observations * self.reading.scale().ln();
+        let density = observations * self.hypothesis.scale().ln();
         let likelihoods = poses.par_iter().map(|pose| {
-            let pose = context.refine_two_stage(&mended.cloud, pose);
-            let likelihood = share * mended.likelihood_at(context, &fit, &pose) + density;
-            let blocked = context.blocked(&mended.cloud, mended.sensor_m.as_ref(), &pose);
+            let pose = context.refine_two_stage(&reinterpreted.cloud, pose);
+            let likelihood = share * reinterpreted.likelihood_at(context, &fit, &pose) + density;
+            let blocked =
+                context.blocked(&reinterpreted.cloud, reinterpreted.sensor_m.as_ref(), &pose);
             Refined {
                 likelihood,
                 total: likelihood - blocked * observations,
             }
         });
         let best = likelihoods.reduce(|| Refined::NOWHERE, Refined::max);
-        let other = Other::new(self.reading, best.total, refined.total, observations);
-        Some(Other {
+        let other = BestHypothesis::new(self.hypothesis, best.total, refined.total, observations);
+        Some(BestHypothesis {
             ahead: other.ahead.max(best.likelihood - refined.likelihood),
             ..other
         })
@@ -218,20 +225,21 @@ impl Refined {
     }
 }
 
-/// The best other reading of a cloud, after a first look, given what the cloud as it is has after its last refinement.
+/// The best other hypothesis of a cloud, after a first look, given what the cloud as it is has after its last refinement.
 ///
 /// A rough search leaves out those that cannot be it; if none of the rest is certain and the cloud is in doubt, all are
 /// looked at.
-pub(super) fn other_reading(
+pub(super) fn best_axis_hypothesis(
     context: &RegistrationContext<'_>,
     straight: &[Candidate],
     refined: Refined,
     in_doubt: bool,
     region: Option<&Region>,
-) -> Option<Other> {
-    let as_it_is = Mended::new(context, &context.input.few, &Reading::scaled(1.0))?;
+) -> Option<BestHypothesis> {
+    let as_it_is =
+        ReinterpretedCloud::new(context, &context.input.few, &AxisHypothesis::scaled(1.0))?;
     let rough = as_it_is.rough_score(context, region);
-    let (axes, scales) = readings(context, region);
+    let (axes, scales) = axis_hypotheses(context, region);
     let (mut likely, mut rest) = scored(context, axes, rough - ROUGH, LOOKED_AT);
     let (scales, other_scales) = scored(context, scales, rough + SCALED_AHEAD, 1);
     likely.extend(scales);
@@ -239,8 +247,8 @@ pub(super) fn other_reading(
     let straight = straight.iter().map(|c| c.likelihood.total());
     let straight = straight.fold(0.0, f64::max);
     let by_few = |found: &Found| {
-        Other::new(
-            found.reading,
+        BestHypothesis::new(
+            found.hypothesis,
             found.likelihood,
             straight,
             context.few.observations(),
@@ -269,66 +277,72 @@ pub(super) fn other_reading(
     others.max_by(|a, b| a.ahead.total_cmp(&b.ahead))
 }
 
-/// A reading after a first look: its likelihood by a few points, and its best poses.
+/// A hypothesis after a first look: its likelihood by a few points, and its best poses.
 struct Found {
-    reading: Reading,
+    hypothesis: AxisHypothesis,
     likelihood: f64,
     poses: Vec<Isometry3<f64>>,
 }
 
-/// Looks at readings by a few points.
-fn look_at(context: &RegistrationContext<'_>, readings: &[Hopeful<'_>]) -> Vec<Found> {
-    let found = readings.par_iter().filter_map(|(reading, region, mended)| {
-        let places = match reading.is_scaled() {
-            true => SCALED_PLACES,
-            false => MISREAD_PLACES,
-        };
-        // A density of lengths that are to be multiplied is one over them.
-        let density = context.few.observations() * reading.scale().ln();
-        let (likelihood, poses) = mended.likelihood(context, *region, places)?;
-        Some(Found {
-            reading: *reading,
-            likelihood: likelihood + density,
-            poses,
-        })
-    });
+/// Looks at hypotheses by a few points.
+fn look_at(context: &RegistrationContext<'_>, hypotheses: &[Hopeful<'_>]) -> Vec<Found> {
+    let found = hypotheses
+        .par_iter()
+        .filter_map(|(hypothesis, region, reinterpreted)| {
+            let places = match hypothesis.is_scaled() {
+                true => SCALED_PLACES,
+                false => MISREAD_PLACES,
+            };
+            // A density of lengths that are to be multiplied is one over them.
+            let density = context.few.observations() * hypothesis.scale().ln();
+            let (likelihood, poses) = reinterpreted.likelihood(context, *region, places)?;
+            Some(Found {
+                hypothesis: *hypothesis,
+                likelihood: likelihood + density,
+                poses,
+            })
+        });
     found.collect()
 }
 
 /// Readings of axes that a cloud may have, and of scales, each with where it is searched.
-fn readings<'a>(
+fn axis_hypotheses<'a>(
     context: &RegistrationContext<'_>,
     region: Option<&'a Region>,
 ) -> (Vec<Asked<'a>>, Vec<Asked<'a>>) {
     // A cloud that may lean is not of a headset, whose axes are often mistaken.
-    let mut axes = vec![(Reading::MIRRORED, region)];
+    let mut axes = vec![(AxisHypothesis::MIRRORED, region)];
     if context.options.gravity_sigma_rad.is_finite() {
-        let on_their_side = Reading::on_their_side().into_iter();
-        axes.extend(on_their_side.map(|reading| (reading, None)));
+        let on_their_side = AxisHypothesis::on_their_side().into_iter();
+        axes.extend(on_their_side.map(|hypothesis| (hypothesis, None)));
     }
     // Nor is the scale of a laser in doubt.
     let scales = match context.options.scale_sigma > 0.0 {
-        true => SCALES.map(|by| (Reading::scaled(by), region)).to_vec(),
+        true => SCALES
+            .map(|by| (AxisHypothesis::scaled(by), region))
+            .to_vec(),
         false => Vec::new(),
     };
     (axes, scales)
 }
 
-type Asked<'a> = (Reading, Option<&'a Region>);
-type Hopeful<'a> = (Reading, Option<&'a Region>, Mended);
+type Asked<'a> = (AxisHypothesis, Option<&'a Region>);
+type Hopeful<'a> = (AxisHypothesis, Option<&'a Region>, ReinterpretedCloud);
 
-/// The readings to which a rough search gives a score of `least`, the best `most` of them, and the rest.
+/// The hypotheses to which a rough search gives a score of `least`, the best `most` of them, and the rest.
 fn scored<'a>(
     context: &RegistrationContext<'_>,
-    readings: Vec<Asked<'a>>,
+    hypotheses: Vec<Asked<'a>>,
     least: f64,
     most: usize,
 ) -> (Vec<Hopeful<'a>>, Vec<Hopeful<'a>>) {
-    let scored = readings.into_par_iter().filter_map(|(reading, region)| {
-        let mended = Mended::new(context, &context.input.few, &reading)?;
-        let score = mended.rough_score(context, region);
-        Some((score, (reading, region, mended)))
-    });
+    let scored = hypotheses
+        .into_par_iter()
+        .filter_map(|(hypothesis, region)| {
+            let reinterpreted = ReinterpretedCloud::new(context, &context.input.few, &hypothesis)?;
+            let score = reinterpreted.rough_score(context, region);
+            Some((score, (hypothesis, region, reinterpreted)))
+        });
     let mut scored: Vec<(f64, Hopeful<'a>)> = scored.collect();
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let likely = scored
@@ -339,20 +353,20 @@ fn scored<'a>(
     (ranked, rest)
 }
 
-/// A cloud by another reading.
-struct Mended {
+/// A cloud by another hypothesis.
+struct ReinterpretedCloud {
     cloud: PreparedCloud,
     sensor_m: Option<Point3<f64>>,
 }
 
-impl Mended {
+impl ReinterpretedCloud {
     fn new(
         context: &RegistrationContext<'_>,
         given: &PreparedCloud,
-        reading: &Reading,
-    ) -> Option<Mended> {
-        let matrix = &reading.matrix;
-        let turn = matrix / reading.scale();
+        hypothesis: &AxisHypothesis,
+    ) -> Option<ReinterpretedCloud> {
+        let matrix = &hypothesis.matrix;
+        let turn = matrix / hypothesis.scale();
         let labels = match given.is_labelled() {
             true => (0..given.len()).map(|i| given.label(i)).collect(),
             false => Vec::new(),
@@ -362,7 +376,7 @@ impl Mended {
         let cloud = PreparedCloud::new(cloud, &PrepareOptions::default()).ok()?;
         let cloud = cloud.with_normals(|i| given.normals().get(i).map(|n| turn * n));
         let sensor_m = context.input.sensor_m.map(|p| matrix * p);
-        Some(Mended { cloud, sensor_m })
+        Some(ReinterpretedCloud { cloud, sensor_m })
     }
 
     fn source(&self) -> SearchSource {
