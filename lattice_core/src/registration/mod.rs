@@ -20,8 +20,8 @@ pub use confusion::{Confusion, Lift};
 pub use downsample::voxel_downsample;
 pub use error::RegistrationError;
 pub use global::{
-    AbsoluteFit, Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest,
-    ClassReliability, DirectionKind, Margin, Profile, Progress, ScaleEstimate, SourceCloud, Stage,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, ClassReliability,
+    DirectionKind, FitDiagnostics, Margin, Profile, Progress, ScaleEstimate, SourceCloud, Stage,
     TrackUpdate, Unexplained, UnexplainedKind, Verdict, WeakDirection, p_wrong_in_words,
     register_global, track,
 };

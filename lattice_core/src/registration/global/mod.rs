@@ -10,13 +10,13 @@ mod axis_hypotheses;
 mod candidates;
 mod cloud_statistics;
 mod covariance;
+mod fit_diagnostics;
 mod input;
 mod map;
 mod margin;
 mod probe;
 mod profile;
 mod rays;
-mod regions;
 mod scale;
 mod track;
 mod types;
@@ -34,10 +34,10 @@ use candidates::{Candidate, RegistrationContext};
 use input::Input;
 use types::Refusal;
 
+pub use fit_diagnostics::{FitDiagnostics, Unexplained, UnexplainedKind};
 pub use map::CalibrationMap;
 pub use margin::{Margin, p_wrong_in_words};
 pub use profile::Profile;
-pub use regions::{AbsoluteFit, Unexplained, UnexplainedKind};
 pub use track::{TrackUpdate, track};
 pub use types::{
     Calibration, CalibrationOptions, CalibrationRequest, ClassReliability, DirectionKind, Progress,

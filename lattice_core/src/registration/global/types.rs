@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
+use super::fit_diagnostics::FitDiagnostics;
 use super::margin::Margin;
 use super::profile::Profile;
-use super::regions::AbsoluteFit;
 use crate::pose::Axes;
 use crate::registration::{Confusion, SemanticCloud};
 
@@ -213,7 +213,7 @@ pub struct Calibration {
     /// Margin over the best different pose.
     pub margin: Margin,
     /// Fit of the cloud to the map as such, part by part.
-    pub fit: AbsoluteFit,
+    pub fit: FitDiagnostics,
     /// Log-likelihood by which other axes or another unit of the cloud are ahead after a first look; None if a rough
     /// one was enough.
     pub axis_hypothesis_lead: Option<f64>,
@@ -242,7 +242,7 @@ impl Calibration {
             covariance: Matrix6::zeros(),
             scale: None,
             margin: Margin::default(),
-            fit: AbsoluteFit::default(),
+            fit: FitDiagnostics::default(),
             axis_hypothesis_lead: None,
             inlier_fraction: 0.0,
             rmse_m: 0.0,

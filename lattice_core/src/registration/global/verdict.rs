@@ -5,9 +5,9 @@ use nalgebra::{Isometry3, Matrix6, Vector3};
 use super::super::likelihood::Partners;
 use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::{ErrorModel, PoseCovariance};
+use super::fit_diagnostics::{FitDiagnostics, fit_diagnostics};
 use super::likeliest;
 use super::margin::{Margin, SOFTNESS, p_wrong_in_words};
-use super::regions::{AbsoluteFit, absolute_fit};
 use super::scale::scale_at;
 use super::types::{
     Calibration, CalibrationOptions, ClassReliability, DirectionKind, ScaleEstimate, Verdict,
@@ -50,7 +50,7 @@ pub(super) fn select_and_classify(
     let centroid = context.centroid();
     let (shift_m, turn_rad) = context.least_difference();
     let pose = best.target_from_source;
-    let fit = absolute_fit(context, &pose);
+    let fit = fit_diagnostics(context, &pose);
     let margin = margin(context, &all, best, &fit);
     let covariance = covariance(context, best).map(|surfaces| {
         let near = all
@@ -120,7 +120,7 @@ fn margin(
     context: &RegistrationContext<'_>,
     all: &[Candidate],
     best: &Candidate,
-    fit: &AbsoluteFit,
+    fit: &FitDiagnostics,
 ) -> Margin {
     let outlier = context.fit.outlier_log_likelihood();
     let mut alternatives = context.alternatives(all, best, MAX_ALTERNATIVES);
@@ -225,7 +225,7 @@ fn classify(
     options: &CalibrationOptions,
     best: &Candidate,
     margin: &Margin,
-    fit: &AbsoluteFit,
+    fit: &FitDiagnostics,
     held: bool,
     weak: &[WeakDirection],
 ) -> (Verdict, String) {
@@ -273,7 +273,7 @@ fn classify(
 }
 
 /// Says that the map speaks against a pose.
-fn contradiction(fit: &AbsoluteFit, options: &CalibrationOptions) -> String {
+fn contradiction(fit: &FitDiagnostics, options: &CalibrationOptions) -> String {
     let [floating, blocked, most] =
         [fit.floating, fit.blocked, options.max_contradicted].map(|share| 100.0 * share);
     format!(

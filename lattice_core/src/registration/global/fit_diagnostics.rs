@@ -26,7 +26,7 @@ const BEHIND_M: f64 = 10.0;
 
 /// Fit of a cloud to a map as such, part by part.
 #[derive(Clone, PartialEq, Debug, Default)]
-pub struct AbsoluteFit {
+pub struct FitDiagnostics {
     /// Squared shift of the regions against the map, in variances that sensor and cells explain, mean over all
     /// directions that are held: about 1 or less where nothing else is at work.
     pub chi_square: f64,
@@ -39,7 +39,7 @@ pub struct AbsoluteFit {
     pub unexplained: Vec<Unexplained>,
 }
 
-impl AbsoluteFit {
+impl FitDiagnostics {
     /// The regions that are not explained, in words; None if all are.
     pub(super) fn in_words(&self) -> Option<String> {
         let first = self.unexplained.first()?;
@@ -117,10 +117,10 @@ struct Shift {
 }
 
 /// Judges a pose by itself.
-pub(super) fn absolute_fit(
+pub(super) fn fit_diagnostics(
     context: &RegistrationContext<'_>,
     pose: &Isometry3<f64>,
-) -> AbsoluteFit {
+) -> FitDiagnostics {
     let regions = regions(context, pose);
     let scale = context.map.scale(context.options.noise_m);
     let sigmas_m = (context.options.noise_m, scale.normal_m);
@@ -136,7 +136,7 @@ pub(super) fn absolute_fit(
     unexplained.truncate(LISTED);
     let sum = |of: fn(&Region) -> usize| regions.values().map(of).sum::<usize>() as f64;
     let looked_at = sum(|r| r.looked_at).max(1.0);
-    AbsoluteFit {
+    FitDiagnostics {
         chi_square: chi_square / f64::from(held.max(1)),
         floating: sum(|r| r.floating) / looked_at,
         blocked: sum(|r| r.hidden) / looked_at,
