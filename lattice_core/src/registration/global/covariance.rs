@@ -30,9 +30,9 @@ const NONE: f64 = 1e-9;
 /// Covariance of a pose whose source is a surface that is wrong by whole regions.
 ///
 /// Points of a region err together (a mesh is bent, a depth camera is off), which the inverse Hessian
-/// does not know: it would be far too small (Bonnabel et al., arXiv 1410.7632). So the pull of each
+/// does not know: it would be far too small (Bonnabel et al., arXiv 1410.7632). So the gradient of each
 /// region is what varies: as the residuals show it, as the source is known to err, and as surfaces err that are not
-/// planes: H^-1 (sum over regions of the covariance of their pulls) H^-1. Points pull across surfaces only: a plane holds
+/// planes: H^-1 (sum over regions of the covariance of their gradients) H^-1. Points gradient across surfaces only: a plane holds
 /// nothing along itself, though the nearest point of it does, nor does it by the noise of its normals, of which H is
 /// rid as in a regression whose regressors err.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -60,9 +60,9 @@ pub(super) struct ErrorModel {
     pub gate_m: f64,
 }
 
-/// Pull of the points of a region on the pose.
+/// RegionGradient of the points of a region on the pose.
 #[derive(Clone, Copy, Default)]
-struct Pull {
+struct RegionGradient {
     residual: Vector6<f64>,
     motion: Matrix6x3<f64>,
     bend: Matrix6x3<f64>,
@@ -78,7 +78,7 @@ impl PoseCovariance {
     ) -> Option<PoseCovariance> {
         let mut information = Information::default();
         let mut scaling = Vector6::zeros();
-        let mut pulls: BTreeMap<[i64; 3], Pull> = BTreeMap::new();
+        let mut gradients: BTreeMap<[i64; 3], RegionGradient> = BTreeMap::new();
         let mut within: BTreeMap<[i64; 3], Matrix6x3<f64>> = BTreeMap::new();
         for (i, point) in source.points_m().iter().enumerate() {
             let place = target_from_source * point;
@@ -100,23 +100,25 @@ impl PoseCovariance {
             let lever = lever(target_from_source, point, &across);
             information.add(weight, &lever, sine_squared, point);
             scaling += lever * weight * across.dot(&(target_from_source * (point - model.center)));
-            let pull = pulls.entry(region_of(point, model.region_m)).or_default();
-            pull.residual += lever * weight * residual_m;
+            let gradient = gradients
+                .entry(region_of(point, model.region_m))
+                .or_default();
+            gradient.residual += lever * weight * residual_m;
             let motion = lever * weight * across.transpose();
-            pull.motion += motion;
-            pull.bend += motion * (BENT * model.spacing_m * sine_squared.sqrt());
+            gradient.motion += motion;
+            gradient.bend += motion * (BENT * model.spacing_m * sine_squared.sqrt());
             if let Some(side_m) = model.within_m {
                 *within.entry(region_of(point, side_m)).or_default() += motion;
             }
         }
         let mut scatter = model.scale_sigma.powi(2) * scaling * scaling.transpose();
-        for pull in pulls.values() {
-            scatter += pull.residual * pull.residual.transpose();
-            scatter += pull.bend * pull.bend.transpose();
+        for gradient in gradients.values() {
+            scatter += gradient.residual * gradient.residual.transpose();
+            scatter += gradient.bend * gradient.bend.transpose();
         }
-        for motion in pulls
+        for motion in gradients
             .values()
-            .map(|pull| &pull.motion)
+            .map(|gradient| &gradient.motion)
             .chain(within.values())
         {
             scatter += model.sigma_m.powi(2) * motion * motion.transpose();
@@ -124,7 +126,7 @@ impl PoseCovariance {
         let inverse = information.inverse()?;
         let at_source = inverse * scatter * inverse;
         let finite = at_source.iter().all(|c| c.is_finite());
-        (finite && !pulls.is_empty()).then_some(PoseCovariance { at_source })
+        (finite && !gradients.is_empty()).then_some(PoseCovariance { at_source })
     }
 
     /// The pose and its covariance when both frames are known to stand upright up to `sigma_rad`.

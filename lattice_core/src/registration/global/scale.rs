@@ -24,9 +24,9 @@ const CLEAR_GAIN: f64 = 40.0;
 /// Scales that are believed to be of one world.
 const SANE: std::ops::Range<f64> = 0.5..2.0;
 
-/// Pose and scale, and what pulls at both by region.
+/// Pose and scale, and what equations at both by region.
 #[derive(Default)]
-struct Pulls {
+struct NormalEquations7 {
     hessian: OMatrix<f64, U7, U7>,
     regions: BTreeMap<[i64; 3], (SVector<f64, 7>, SMatrix<f64, 7, 3>)>,
 }
@@ -51,10 +51,14 @@ pub(super) fn scale_at(
     let (mut pose, mut scale) = (*target_from_source, 1.0);
     let mut last = None;
     for _ in 0..STEPS {
-        let pulls = Pulls::at(source, target, &pose, scale, model);
-        let inverse = pulls.hessian.try_inverse()?;
-        let pull: SVector<f64, 7> = pulls.regions.values().map(|(residual, _)| residual).sum();
-        let step = -(inverse * pull);
+        let equations = NormalEquations7::at(source, target, &pose, scale, model);
+        let inverse = equations.hessian.try_inverse()?;
+        let gradient: SVector<f64, 7> = equations
+            .regions
+            .values()
+            .map(|(residual, _)| residual)
+            .sum();
+        let step = -(inverse * gradient);
         let moved = step.fixed_rows::<6>(0).into_owned();
         (pose, scale) = (pose * se3::exp(&moved), scale + step[6]);
         if !SANE.contains(&scale) {
@@ -65,7 +69,7 @@ pub(super) fn scale_at(
             let moved = (lever * motion).norm_squared();
             (lever * residual).norm_squared() + model.sigma_m.powi(2) * moved
         };
-        let variance: f64 = pulls.regions.values().map(variance).sum();
+        let variance: f64 = equations.regions.values().map(variance).sum();
         // What a step still moves is not known.
         let sigma = variance.sqrt().hypot(step[6]);
         last = sigma.is_finite().then_some(ScaledPose {
@@ -138,27 +142,27 @@ impl ScaleEstimate {
     }
 }
 
-impl Pulls {
+impl NormalEquations7 {
     fn at(
         source: &PreparedCloud,
         target: &PreparedCloud,
         pose: &Isometry3<f64>,
         scale: f64,
         model: &ErrorModel,
-    ) -> Pulls {
-        let mut pulls = Pulls::default();
+    ) -> NormalEquations7 {
+        let mut equations = NormalEquations7::default();
         for term in terms(source, target, pose, scale, model) {
             let mut jacobian = SMatrix::<f64, 3, 7>::zeros();
             jacobian.fixed_columns_mut::<6>(0).copy_from(&term.jacobian);
             jacobian.set_column(6, &-term.stretch);
             let lever = jacobian.transpose() * term.weight;
-            pulls.hessian += lever * jacobian;
+            equations.hessian += lever * jacobian;
             let region = region_of(&term.point, model.region_m);
-            let (residual, motion) = pulls.regions.entry(region).or_default();
+            let (residual, motion) = equations.regions.entry(region).or_default();
             *residual += lever * term.residual;
             *motion += lever;
         }
-        pulls
+        equations
     }
 }
 
