@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::super::search::{Region, SearchSource, angle_between, search, yaw_of};
 use super::candidates::{COARSE_STEPS, Candidate, RegistrationContext};
-use super::likeliest;
+use super::most_likely;
 
 /// Number of alternatives among the candidates that are refined like the most likely one.
 const REFINED_ALTERNATIVES: usize = 4;
@@ -34,7 +34,7 @@ impl RegistrationContext<'_> {
         all: &[Candidate],
         region: Option<&Region>,
     ) -> Vec<Candidate> {
-        let Some(best) = likeliest(all) else {
+        let Some(best) = most_likely(all) else {
             return Vec::new();
         };
         let mut places = vec![(best.target_from_source, best.method)];
@@ -47,13 +47,14 @@ impl RegistrationContext<'_> {
         let symmetric_poses = self.symmetric_poses(best, region);
         places.extend(symmetric_poses.into_iter().map(|pose| (pose, "search")));
         let refined = places.par_iter().map(|(pose, method)| {
-            let pose = self.refine_narrow_gate(&self.input.full, pose);
-            self.judge(&self.fit, pose, method)
+            let pose = self.refine_narrow_gate(&self.source.full, pose);
+            self.evaluate(&self.fit, pose, method)
         });
         let refined: Vec<Candidate> = refined.collect();
-        let least = likeliest(&refined).map_or(0.0, Candidate::total) - self.pruning_threshold();
+        let least = most_likely(&refined).map_or(0.0, Candidate::total) - self.pruning_threshold();
         let kept = refined.into_par_iter().filter(|c| c.total() > least);
-        kept.map(|candidate| self.climbed(candidate)).collect()
+        kept.map(|candidate| self.optimize_weak_directions(candidate))
+            .collect()
     }
 
     /// Selects up to `most` distinct candidates other than `best`, sorted by descending likelihood.
@@ -64,7 +65,7 @@ impl RegistrationContext<'_> {
         most: usize,
     ) -> Vec<&'a Candidate> {
         let centroid = self.centroid();
-        let (shift_m, turn_rad) = self.least_difference();
+        let (shift_m, turn_rad) = self.min_separation();
         let mut sorted: Vec<&Candidate> = all.iter().collect();
         sorted.sort_by(|a, b| b.total().total_cmp(&a.total()));
         let mut kept = vec![best];
@@ -86,9 +87,10 @@ impl RegistrationContext<'_> {
 
     /// Finds the best pose for each symmetry rotation of the room.
     fn symmetric_poses(&self, best: &Candidate, region: Option<&Region>) -> Vec<Isometry3<f64>> {
-        let source = SearchSource::by_surface(&self.input.few, self.input.sensor_m);
-        let best_of_coarse = self.judge(&self.few, best.target_from_source, best.method);
-        let least = best_of_coarse.total() - COMPETITIVE_PER_OBSERVATION * self.few.observations();
+        let source = SearchSource::by_surface(&self.source.coarse, self.source.sensor_m);
+        let best_of_coarse = self.evaluate(&self.coarse_fit, best.target_from_source, best.method);
+        let least =
+            best_of_coarse.total() - COMPETITIVE_PER_OBSERVATION * self.coarse_fit.observations();
         let best_at = |turn_rad: &f64| {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), *turn_rad);
             let about = Isometry3::from_parts(
@@ -109,13 +111,13 @@ impl RegistrationContext<'_> {
             };
             let evaluated = found.par_iter().map(|hypothesis| {
                 let pose = self.refine_steps(
-                    &self.input.few,
+                    &self.source.coarse,
                     &hypothesis.target_from_source,
                     COARSE_STEPS,
                 );
-                self.judge(&self.few, pose, "search")
+                self.evaluate(&self.coarse_fit, pose, "search")
             });
-            likeliest(&evaluated.collect::<Vec<_>>())
+            most_likely(&evaluated.collect::<Vec<_>>())
                 .filter(|pose| pose.total() > least)
                 .map(|pose| self.refine_wide_gate(&pose.target_from_source))
         };

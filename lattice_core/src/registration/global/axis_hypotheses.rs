@@ -168,7 +168,7 @@ impl BestHypothesis {
         refined: Refined,
     ) -> Option<BestHypothesis> {
         let reinterpreted =
-            ReinterpretedCloud::new(context, &context.input.full, &self.hypothesis)?;
+            ReinterpretedCloud::new(context, &context.source.full, &self.hypothesis)?;
         let scale = context.map.scale(context.options.noise_m);
         let fit = Fit::new(&reinterpreted.cloud, &context.map.cloud, scale);
         let observations = context.fit.observations();
@@ -236,8 +236,11 @@ pub(super) fn best_axis_hypothesis(
     in_doubt: bool,
     region: Option<&Region>,
 ) -> Option<BestHypothesis> {
-    let as_it_is =
-        ReinterpretedCloud::new(context, &context.input.few, &AxisHypothesis::scaled(1.0))?;
+    let as_it_is = ReinterpretedCloud::new(
+        context,
+        &context.source.coarse,
+        &AxisHypothesis::scaled(1.0),
+    )?;
     let rough = as_it_is.rough_score(context, region);
     let (axes, scales) = axis_hypotheses(context, region);
     let (mut likely, mut rest) = scored(context, axes, rough - ROUGH, LOOKED_AT);
@@ -251,7 +254,7 @@ pub(super) fn best_axis_hypothesis(
             found.hypothesis,
             found.likelihood,
             straight,
-            context.few.observations(),
+            context.coarse_fit.observations(),
         )
     };
     let closely = |found: &Found| {
@@ -294,7 +297,7 @@ fn look_at(context: &RegistrationContext<'_>, hypotheses: &[Hopeful<'_>]) -> Vec
                 false => MISREAD_PLACES,
             };
             // A density of lengths that are to be multiplied is one over them.
-            let density = context.few.observations() * hypothesis.scale().ln();
+            let density = context.coarse_fit.observations() * hypothesis.scale().ln();
             let (likelihood, poses) = reinterpreted.likelihood(context, *region, places)?;
             Some(Found {
                 hypothesis: *hypothesis,
@@ -339,7 +342,8 @@ fn scored<'a>(
     let scored = hypotheses
         .into_par_iter()
         .filter_map(|(hypothesis, region)| {
-            let reinterpreted = ReinterpretedCloud::new(context, &context.input.few, &hypothesis)?;
+            let reinterpreted =
+                ReinterpretedCloud::new(context, &context.source.coarse, &hypothesis)?;
             let score = reinterpreted.rough_score(context, region);
             Some((score, (hypothesis, region, reinterpreted)))
         });
@@ -375,7 +379,7 @@ impl ReinterpretedCloud {
         let cloud = SemanticCloud { points_m, labels };
         let cloud = PreparedCloud::new(cloud, &PrepareOptions::default()).ok()?;
         let cloud = cloud.with_normals(|i| given.normals().get(i).map(|n| turn * n));
-        let sensor_m = context.input.sensor_m.map(|p| matrix * p);
+        let sensor_m = context.source.sensor_m.map(|p| matrix * p);
         Some(ReinterpretedCloud { cloud, sensor_m })
     }
 
@@ -399,7 +403,7 @@ impl ReinterpretedCloud {
         let hypotheses = search(&context.map.surfaces, &self.source(), region, places);
         let scale = context.map.scale(context.options.noise_m).coarser(2.0);
         let fit = Fit::new(&self.cloud, &context.map.cloud, scale);
-        let share = context.few.observations() / fit.observations().max(1.0);
+        let share = context.coarse_fit.observations() / fit.observations().max(1.0);
         let mut found = context.refine_best(&self.cloud, &hypotheses, looked_at, |pose| {
             (self.likelihood_at(context, &fit, &pose), pose)
         });
@@ -416,7 +420,11 @@ impl ReinterpretedCloud {
         pose: &Isometry3<f64>,
     ) -> f64 {
         let partners = fit.partners(pose);
-        let (likelihood, _) = fit.likelihood(&partners, &context.known, context.options.agreement);
+        let (likelihood, _) = fit.likelihood(
+            &partners,
+            &context.prior_confusion,
+            context.options.agreement,
+        );
         likelihood.total()
     }
 }

@@ -149,7 +149,7 @@ fn regions(context: &RegistrationContext<'_>, pose: &Isometry3<f64>) -> BTreeMap
     let (map, side_m) = (&context.map.cloud, context.options.region_m);
     let gate_m = context.map.scale(context.options.noise_m).gate_m();
     let mut regions: BTreeMap<[i64; 3], Region> = BTreeMap::new();
-    for point in context.input.full.points_m() {
+    for point in context.source.full.points_m() {
         let place = pose * point;
         let region = regions.entry(region_of(point, side_m)).or_default();
         region.points += 1;
@@ -162,12 +162,12 @@ fn regions(context: &RegistrationContext<'_>, pose: &Isometry3<f64>) -> BTreeMap
             region.pull_m += n * n.dot(&(place - q));
         }
     }
-    let Some(sensor_m) = context.input.sensor_m else {
+    let Some(sensor_m) = context.source.sensor_m else {
         return regions;
     };
     let (from, occupied) = (pose * sensor_m, &context.map.occupied);
     let clear_m = CLEAR * context.map.spacing_m;
-    for point in context.input.few.points_m() {
+    for point in context.source.coarse.points_m() {
         let region = regions.entry(region_of(point, side_m)).or_default();
         let place = pose * point;
         let length = nalgebra::distance(&from, &place);

@@ -49,12 +49,12 @@ impl Margin {
         };
         let mut all: Vec<Margin> = places.into_iter().map(one).collect();
         all.sort_by(|a, b| a.against().total_cmp(&b.against()));
-        let likeliest = *all.first()?;
-        let beside = |place: &Margin| (likeliest.against() - place.against()).exp();
+        let most_likely = *all.first()?;
+        let beside = |place: &Margin| (most_likely.against() - place.against()).exp();
         let others: f64 = all.iter().skip(1).map(beside).sum();
         Some(Margin {
             places: 1.0 + others,
-            ..likeliest
+            ..most_likely
         })
     }
 

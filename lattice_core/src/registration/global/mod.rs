@@ -11,16 +11,16 @@ mod candidates;
 mod cloud_statistics;
 mod covariance;
 mod fit_diagnostics;
-mod input;
 mod map;
 mod margin;
-mod probe;
 mod profile;
 mod rays;
 mod scale;
+mod source;
 mod track;
 mod types;
 mod verdict;
+mod weak_directions;
 
 use std::ops::ControlFlow;
 
@@ -31,7 +31,7 @@ use super::search::{Hypothesis, Region, SearchMap, SearchSource, search};
 use super::{LabelDistribution, PreparedCloud, RegisterOptions, register};
 use axis_hypotheses::{BestHypothesis, Refined, best_axis_hypothesis};
 use candidates::{Candidate, RegistrationContext};
-use input::Input;
+use source::PreparedSource;
 use types::Refusal;
 
 pub use fit_diagnostics::{FitDiagnostics, Unexplained, UnexplainedKind};
@@ -81,8 +81,8 @@ fn run(
     progress: &dyn Progress,
 ) -> Result<Calibration, Refusal> {
     step(progress, Stage::Prepare, 0.0)?;
-    let input = Input::new(request, options, map.spacing_m)?;
-    let context = RegistrationContext::new(map, &input, options, request.confusion);
+    let source = PreparedSource::new(request, options, map.spacing_m)?;
+    let context = RegistrationContext::new(map, &source, options, request.confusion);
     step(progress, Stage::Search, 0.1)?;
     let region = request.start.map(|about| Region {
         about,
@@ -175,7 +175,7 @@ impl Calibration {
 }
 
 /// The candidate that most speaks for.
-fn likeliest(all: &[Candidate]) -> Option<&Candidate> {
+fn most_likely(all: &[Candidate]) -> Option<&Candidate> {
     all.iter()
         .reduce(|a, b| if b.total() > a.total() { b } else { a })
 }
@@ -189,27 +189,28 @@ fn step(progress: &dyn Progress, stage: Stage, fraction: f64) -> Result<(), Refu
 }
 
 fn by_surfaces(context: &RegistrationContext<'_>, region: Option<&Region>) -> Vec<Hypothesis> {
-    let source = SearchSource::by_surface(&context.input.few, context.input.sensor_m);
+    let source = SearchSource::by_surface(&context.source.coarse, context.source.sensor_m);
     search(&context.map.surfaces, &source, region, BY_SURFACES)
 }
 
 /// Poses that the labels fit, as far as it is known how they go together.
 fn by_labels(context: &RegistrationContext<'_>, region: Option<&Region>) -> Vec<Hypothesis> {
-    let (few, map) = (&context.input.few, &context.map.cloud);
-    if !few.is_labelled() || !map.is_labelled() {
+    let (coarse, map) = (&context.source.coarse, &context.map.cloud);
+    if !coarse.is_labelled() || !map.is_labelled() {
         return Vec::new();
     }
-    let classes = frequent_classes(few);
-    let lift = context.known.lift(context.options.agreement);
+    let classes = frequent_classes(coarse);
+    let lift = context.prior_confusion.lift(context.options.agreement);
     let score = |i: usize, channel: usize| {
         let class = classes.get(channel).copied().unwrap_or_default();
         let lift = lift.expected(&LabelDistribution::hard(class), &map.label(i));
         // From 0 for a quarter of chance to 100 for four times of it.
         (50.0 * (1.0 + lift.clamp(0.25, 4.0).ln() / 4.0_f64.ln())) as u8
     };
-    let channels: Vec<Option<usize>> = (0..few.len())
+    let channels: Vec<Option<usize>> = (0..coarse.len())
         .map(|i| {
-            few.label(i)
+            coarse
+                .label(i)
                 .top()
                 .and_then(|top| classes.iter().position(|c| *c == top))
         })
@@ -218,7 +219,7 @@ fn by_labels(context: &RegistrationContext<'_>, region: Option<&Region>) -> Vec<
     else {
         return Vec::new();
     };
-    let source = SearchSource::by_class(few, context.input.sensor_m, &channels);
+    let source = SearchSource::by_class(coarse, context.source.sensor_m, &channels);
     search(&labels, &source, region, BY_LABELS)
 }
 
@@ -235,10 +236,10 @@ fn frequent_classes(cloud: &PreparedCloud) -> Vec<u16> {
 
 /// Poses that the methods reach from a given start, GICP-SE(3) first.
 fn from_start(context: &RegistrationContext<'_>, start: &Isometry3<f64>) -> Vec<Candidate> {
-    let (source, map) = (&context.input.full, &context.map.cloud);
+    let (source, map) = (&context.source.full, &context.map.cloud);
     // As published, with its wide gate: it comes from farther than ours, and stands where it is right.
     let published = register(source, map, start, &RegisterOptions::gicp_se3());
-    let mut all = vec![context.judge(&context.fit, published.target_from_source, "gicp")];
+    let mut all = vec![context.evaluate(&context.fit, published.target_from_source, "gicp")];
     all.extend(context.refine_with_all_methods(start, "gicp"));
     if source.is_labelled() && map.is_labelled() {
         let gate_m = (30.0 * context.map.spacing_m).max(1.0);
@@ -249,7 +250,7 @@ fn from_start(context: &RegistrationContext<'_>, start: &Isometry3<f64>) -> Vec<
         };
         let pose = register(source, map, start, &options);
         let refined = context.refine_wide_gate(&pose.target_from_source);
-        all.push(context.judge(&context.fit, refined, "class-wise"));
+        all.push(context.evaluate(&context.fit, refined, "class-wise"));
     }
     all
 }

@@ -3,8 +3,8 @@
 use nalgebra::Isometry3;
 
 use super::candidates::RegistrationContext;
-use super::input::Input;
 use super::map::CalibrationMap;
+use super::source::PreparedSource;
 use super::types::{CalibrationOptions, CalibrationRequest, SourceCloud};
 use super::verdict::is_constrained;
 
@@ -40,7 +40,7 @@ pub fn track(
         start: None,
         confusion: None,
     };
-    let Ok(input) = Input::new(&request, options, map.spacing_m) else {
+    let Ok(source) = PreparedSource::new(&request, options, map.spacing_m) else {
         return TrackUpdate {
             fits: false,
             target_from_source: *target_from_source,
@@ -48,10 +48,10 @@ pub fn track(
             rmse_m: 0.0,
         };
     };
-    let context = RegistrationContext::new(map, &input, options, None);
-    let old = context.judge(&context.fit, *target_from_source, "tracking");
+    let context = RegistrationContext::new(map, &source, options, None);
+    let old = context.evaluate(&context.fit, *target_from_source, "tracking");
     let pose = context.refine_wide_gate(target_from_source);
-    let new = context.judge(&context.fit, pose, "tracking");
+    let new = context.evaluate(&context.fit, pose, "tracking");
     let is_better = new.total() > old.total() + BETTER;
     let best = match is_better && is_constrained(&context, &new) {
         true => new,

@@ -6,8 +6,8 @@ use super::super::likelihood::Partners;
 use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::{ErrorModel, PoseCovariance};
 use super::fit_diagnostics::{FitDiagnostics, fit_diagnostics};
-use super::likeliest;
 use super::margin::{Margin, SOFTNESS, p_wrong_in_words};
+use super::most_likely;
 use super::scale::scale_at;
 use super::types::{
     Calibration, CalibrationOptions, ClassReliability, DirectionKind, ScaleEstimate, Verdict,
@@ -48,7 +48,7 @@ pub(super) fn select_and_classify(
         return Calibration::refused(Verdict::NoOverlap, "no place was found");
     };
     let centroid = context.centroid();
-    let (shift_m, turn_rad) = context.least_difference();
+    let (shift_m, turn_rad) = context.min_separation();
     let pose = best.target_from_source;
     let fit = fit_diagnostics(context, &pose);
     let margin = margin(context, &all, best, &fit);
@@ -56,12 +56,15 @@ pub(super) fn select_and_classify(
         let near = all
             .iter()
             .filter(|c| c.is_near(&pose, &centroid, shift_m, turn_rad));
-        near.fold(context.probed(best, surfaces), |sure, alternative| {
-            let odds = ((alternative.total() - best.total()) / SOFTNESS)
-                .exp()
-                .min(1.0);
-            sure.with_alternative(&pose, &alternative.target_from_source, odds / (1.0 + odds))
-        })
+        near.fold(
+            context.with_probed_variances(best, surfaces),
+            |sure, alternative| {
+                let odds = ((alternative.total() - best.total()) / SOFTNESS)
+                    .exp()
+                    .min(1.0);
+                sure.with_alternative(&pose, &alternative.target_from_source, odds / (1.0 + odds))
+            },
+        )
     });
     // Both frames know where down is; but what GICP made of a start stands as it is.
     let gravity = context.options.gravity_sigma_rad;
@@ -92,7 +95,7 @@ pub(super) fn select_and_classify(
     {
         reason = format!("{reason}; {regions}");
     }
-    let confusion = context.known.merged(&best.confusion);
+    let confusion = context.prior_confusion.merged(&best.confusion);
     Calibration {
         verdict,
         reason,
@@ -109,7 +112,7 @@ pub(super) fn select_and_classify(
         method: best.method,
         confusion: match verdict {
             Verdict::Ok => confusion,
-            _ => context.known.clone(),
+            _ => context.prior_confusion.clone(),
         },
         scale,
     }
@@ -193,13 +196,13 @@ fn scale_fault(
     })
 }
 
-/// The likeliest, but what GICP makes of a start if that is the same place or nearly as likely.
+/// The most_likely, but what GICP makes of a start if that is the same place or nearly as likely.
 fn select<'a>(
     context: &RegistrationContext<'_>,
     all: &'a [Candidate],
     started: bool,
 ) -> Option<&'a Candidate> {
-    let best = likeliest(all)?;
+    let best = most_likely(all)?;
     let Some(gicp) = all.first().filter(|_| started) else {
         return Some(best);
     };
@@ -287,13 +290,13 @@ pub(super) fn covariance(
     context: &RegistrationContext<'_>,
     best: &Candidate,
 ) -> Option<PoseCovariance> {
-    let (source, target) = (&context.input.full, &context.map.cloud);
+    let (source, target) = (&context.source.full, &context.map.cloud);
     let model = error_model(context, best);
     PoseCovariance::at(source, target, &best.target_from_source, &model)
 }
 
 fn scale(context: &RegistrationContext<'_>, best: &Candidate) -> Option<ScaleEstimate> {
-    let (source, target) = (&context.input.full, &context.map.cloud);
+    let (source, target) = (&context.source.full, &context.map.cloud);
     let model = error_model(context, best);
     let found = scale_at(source, target, &best.target_from_source, &model)?;
     let (pose, scale) = (&found.target_from_source, found.scale);
@@ -328,7 +331,10 @@ fn error_model(context: &RegistrationContext<'_>, best: &Candidate) -> ErrorMode
         point_m: best.rmse_m,
         spacing_m: context.map.spacing_m,
         scale_sigma: options.scale_sigma,
-        center: context.input.sensor_m.unwrap_or_else(|| context.centroid()),
+        center: context
+            .source
+            .sensor_m
+            .unwrap_or_else(|| context.centroid()),
         gate_m: 6.0 * context.map.spacing_m,
     }
 }

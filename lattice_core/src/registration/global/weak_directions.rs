@@ -27,7 +27,11 @@ const NEAR: [f64; 3] = [2.0, 1.0, 0.5];
 impl RegistrationContext<'_> {
     /// The covariance of a candidate's pose with what its likelihood says of the directions that surfaces and gravity
     /// leave weak: the ends of a wall and its labels hold a pose along the wall.
-    pub fn probed(&self, candidate: &Candidate, surfaces: PoseCovariance) -> PoseCovariance {
+    pub fn with_probed_variances(
+        &self,
+        candidate: &Candidate,
+        surfaces: PoseCovariance,
+    ) -> PoseCovariance {
         let weak = self.weak(candidate, &surfaces);
         weak.iter().fold(surfaces, |covariance, (weak, along)| {
             let variance = self.variance(candidate, weak.kind, along);
@@ -38,31 +42,31 @@ impl RegistrationContext<'_> {
         })
     }
 
-    /// A candidate moved to where it is likeliest along the directions that surfaces and gravity leave weak, in which
+    /// A candidate moved to where it is most_likely along the directions that surfaces and gravity leave weak, in which
     /// registration goes astray.
-    pub fn climbed(&self, candidate: Candidate) -> Candidate {
+    pub fn optimize_weak_directions(&self, candidate: Candidate) -> Candidate {
         let begin = candidate.total();
-        let far = self.climbed_by(candidate, &FAR);
+        let far = self.optimize_by(candidate, &FAR);
         match far.total() > begin {
             // Other directions are weak there.
-            true => self.climbed_by(far, &NEAR),
+            true => self.optimize_by(far, &NEAR),
             false => far,
         }
     }
 
-    fn climbed_by(&self, candidate: Candidate, steps: &[f64]) -> Candidate {
+    fn optimize_by(&self, candidate: Candidate, steps: &[f64]) -> Candidate {
         let Some(surfaces) = covariance(self, &candidate) else {
             return candidate;
         };
         let weak = self.weak(&candidate, &surfaces);
         weak.iter().fold(candidate, |best, (weak, along)| {
             let steps = steps.iter().map(|step| step * self.unit(weak.kind));
-            steps.fold(best, |best, step| self.likelier_of(best, along, step))
+            steps.fold(best, |best, step| self.best_of_steps(best, along, step))
         })
     }
 
-    /// The likeliest of a candidate and those a step to both sides.
-    fn likelier_of(&self, candidate: Candidate, along: &Direction, step: f64) -> Candidate {
+    /// The most_likely of a candidate and those a step to both sides.
+    fn best_of_steps(&self, candidate: Candidate, along: &Direction, step: f64) -> Candidate {
         let sides = [step, -step].map(|step| self.moved(&candidate, along, step));
         let likelier = |a: Candidate, b: Candidate| if b.total() > a.total() { b } else { a };
         sides.into_iter().fold(candidate, likelier)
@@ -86,7 +90,7 @@ impl RegistrationContext<'_> {
 
     fn moved(&self, candidate: &Candidate, along: &Direction, step: f64) -> Candidate {
         let moved = candidate.target_from_source * se3::exp(&(along.motion * step));
-        self.judge(&self.fit, moved, candidate.method)
+        self.evaluate(&self.fit, moved, candidate.method)
     }
 
     /// Variance of a direction about a pose, by the likelihoods of poses along it.
@@ -111,7 +115,7 @@ impl RegistrationContext<'_> {
 
     /// Root mean square distance of the headset's points from their midst, metres.
     pub fn reach_m(&self) -> f64 {
-        let (centroid, points): (Point3<f64>, _) = (self.centroid(), self.input.few.points_m());
+        let (centroid, points): (Point3<f64>, _) = (self.centroid(), self.source.coarse.points_m());
         let sum: f64 = points.iter().map(|p| (p - centroid).norm_squared()).sum();
         (sum / points.len().max(1) as f64)
             .sqrt()
@@ -187,7 +191,7 @@ impl PoseCovariance {
 #[cfg(test)]
 mod tests {
     use super::super::CalibrationMap;
-    use super::super::input::Input;
+    use super::super::source::PreparedSource;
     use super::super::types::{CalibrationOptions, CalibrationRequest, SourceCloud};
     use super::*;
     use crate::registration::SemanticCloud;
@@ -256,16 +260,16 @@ mod tests {
             start: None,
             confusion: None,
         };
-        let input = Input::new(&request, &options, 0.05).unwrap();
-        let context = RegistrationContext::new(&map, &input, &options, None);
+        let source = PreparedSource::new(&request, &options, 0.05).unwrap();
+        let context = RegistrationContext::new(&map, &source, &options, None);
         let off_m = |candidate: &Candidate| candidate.target_from_source.translation.vector.norm();
         for slide in [Vector3::y() * 0.3, Vector3::y() * -0.45, Vector3::z() * 0.2] {
-            let slid = context.judge(
+            let slid = context.evaluate(
                 &context.fit,
                 Isometry3::new(slide, Vector3::zeros()),
                 "search",
             );
-            let back = context.climbed(slid.clone());
+            let back = context.optimize_weak_directions(slid.clone());
             assert!(
                 back.total() > slid.total() && off_m(&back) < 0.05,
                 "{slide}: {}",

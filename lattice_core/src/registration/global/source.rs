@@ -9,22 +9,22 @@ use super::types::{CalibrationOptions, CalibrationRequest, Refusal};
 const MAX_RANGE_M: f64 = 10_000.0;
 
 /// The headset's points at two densities.
-pub(super) struct Input {
+pub(super) struct PreparedSource {
     /// The points that are registered.
     pub full: PreparedCloud,
-    /// A few of them, for a first look.
-    pub few: PreparedCloud,
+    /// A coarse of them, for a first look.
+    pub coarse: PreparedCloud,
     /// Place of the headset, if one is known.
     pub sensor_m: Option<Point3<f64>>,
 }
 
-impl Input {
+impl PreparedSource {
     /// Checks the headset scans, puts them together and thins them to the spacing of the map.
     pub fn new(
         request: &CalibrationRequest<'_>,
         options: &CalibrationOptions,
         spacing_m: f64,
-    ) -> Result<Input, Refusal> {
+    ) -> Result<PreparedSource, Refusal> {
         let rejected = Refusal::Input;
         let n: usize = request.source_clouds.iter().map(|g| g.cloud.len()).sum();
         if n > options.max_points {
@@ -57,7 +57,7 @@ impl Input {
             return Err(rejected("the start is not a pose".into()));
         }
         let full = thinned_to(&all, spacing_m, options.registered_points);
-        let few = thinned_to(&full, 2.0 * spacing_m, options.registered_points / 8);
+        let coarse = thinned_to(&full, 2.0 * spacing_m, options.registered_points / 8);
         let sensors: Vec<Point3<f64>> = request
             .source_clouds
             .iter()
@@ -69,14 +69,14 @@ impl Input {
         };
         let full = prepare(full)?;
         // Too far apart for normals of their own.
-        let points_m = few.points_m.clone();
-        let few = prepare(few)?.with_normals(|i| {
+        let points_m = coarse.points_m.clone();
+        let coarse = prepare(coarse)?.with_normals(|i| {
             let (nearest, _) = full.nearest(points_m.get(i)?, f64::MAX)?;
             full.normals().get(nearest).copied()
         });
-        Ok(Input {
+        Ok(PreparedSource {
             full,
-            few,
+            coarse,
             sensor_m: match (sensors.as_slice(), request.source_clouds.len()) {
                 ([sensor], 1) if sensor.iter().all(|c| c.abs() <= MAX_RANGE_M) => Some(*sensor),
                 _ => None,
@@ -85,7 +85,7 @@ impl Input {
     }
 }
 
-/// Thins a cloud to cells of a side, or larger ones until few enough points are left.
+/// Thins a cloud to cells of a side, or larger ones until coarse enough points are left.
 fn thinned_to(cloud: &SemanticCloud, side_m: f64, most: usize) -> SemanticCloud {
     let mut side_m = side_m;
     loop {
