@@ -1,9 +1,9 @@
-//! Calibration of a headset's frame in a robot's map: no marker, no guess, and an honest verdict.
+//! Global registration of source clouds in a target map, without an initial guess, with a verdict on the result.
 //!
-//! All places are searched by surfaces and by labels; the best are refined by GICP-SE(3) and by
-//! Semantic-ICP with learned labels; one likelihood judges them all (`fit`), in which labels count as
-//! far as they predict each other on parts of the view they were not learned from. GICP-SE(3) from a
-//! given start stands unless another pose is clearly better.
+//! Hypotheses of all poses come from a search by surfaces and one by labels. The best are refined by GICP-SE(3) and
+//! by Semantic-ICP with learned labels. One likelihood ([`RegistrationContext::fit`]) ranks them. Labels contribute
+//! as far as they predict each other across folds of the source. With an initial guess, the result of GICP-SE(3) from
+//! it is kept unless another pose is clearly more likely.
 
 mod alternatives;
 mod axis_hypotheses;
@@ -15,6 +15,7 @@ mod map;
 mod margin;
 mod profile;
 mod rays;
+mod reinterpreted_cloud;
 mod scale;
 mod source;
 mod track;
@@ -44,20 +45,22 @@ pub use types::{
     ScaleEstimate, SourceCloud, Stage, Verdict, WeakDirection,
 };
 
-/// Hypotheses of the search by surfaces: a piece of wall fits many walls.
+/// Hypotheses of the search by surfaces; many, because a planar patch fits many walls.
 const BY_SURFACES: usize = 128;
+/// Hypotheses of the search by labels.
 const BY_LABELS: usize = 64;
+/// Candidates refined with all methods.
 const FINALISTS: usize = 4;
-/// Contradicted share of the lines of sight above which a pose is in doubt; right poses hardly ever reach it.
+/// Fraction of contradicted lines of sight above which a pose is in doubt; correct poses rarely reach it.
 const IN_DOUBT: f64 = 0.1;
-/// Logarithm of the ratio of two scales that are about equal.
+/// Largest log-ratio of two scales that count as equal.
 const ABOUT: f64 = 0.08;
-/// Classes that are searched by, at most.
+/// Maximum number of classes in the search by labels.
 const SEARCHED_CLASSES: usize = 24;
 
-/// Finds the pose of the headset's frame in the map.
+/// Finds `target_from_source` by a search over all poses, or near `request.start`.
 ///
-/// Never fails: input that cannot be used is a verdict. Deterministic on any number of threads.
+/// Unusable input yields [`Verdict::RejectedInput`], not an error. The result is the same on any number of threads.
 pub fn register_global(
     map: &CalibrationMap,
     request: &CalibrationRequest<'_>,
@@ -93,21 +96,21 @@ fn run(
     step(progress, Stage::Search, 0.3)?;
     hypotheses.extend(by_labels(&context, region.as_ref()));
     step(progress, Stage::Refine, 0.5)?;
-    let first = context.coarse_refine(&hypotheses);
+    let coarse = context.coarse_refine(&hypotheses);
     step(progress, Stage::Refine, 0.6)?;
-    let second = context.fine_refine(&first);
+    let fine = context.fine_refine(&coarse);
     step(progress, Stage::Refine, 0.7)?;
-    let least = second.first().map_or(0.0, Candidate::total) - context.pruning_threshold();
-    let mut all: Vec<Candidate> = second
+    let least = fine.first().map_or(0.0, Candidate::total) - context.pruning_threshold();
+    let mut all: Vec<Candidate> = fine
         .par_iter()
         .take(FINALISTS)
         .filter(|c| c.total() >= least)
         .flat_map_iter(|c| context.refine_with_all_methods(&c.target_from_source, "search"))
         .collect();
-    all.extend(second);
+    all.extend(fine);
     all.extend(context.search_alternatives(&all, region.as_ref()));
     if let Some(start) = &request.start {
-        // The first of all is what GICP alone would answer.
+        // The result of GICP-SE(3) from the guess comes first.
         let mut from_start = from_start(&context, start);
         from_start.append(&mut all);
         all = from_start;
@@ -119,36 +122,37 @@ fn run(
     let in_doubt = contradicted > IN_DOUBT && calibration.verdict != Verdict::RejectedInput;
     let other = match options.trust_axes {
         true => None,
-        false => best_axis_hypothesis(&context, &first, refined, in_doubt, region.as_ref()),
+        false => best_axis_hypothesis(&context, &coarse, refined, in_doubt, region.as_ref()),
     };
     let _ = progress.report(Stage::Judge, 1.0);
     Ok(match other {
-        Some(other) => read_as(calibration, &other, options),
+        Some(other) => with_axis_hypothesis(calibration, &other, options),
         None => calibration,
     })
 }
 
-/// The answer when another hypothesis of the cloud was looked at.
-fn read_as(
+/// Adds the best alternative axis or scale hypothesis to a result, which it may reject.
+fn with_axis_hypothesis(
     found: Calibration,
     other: &BestHypothesis,
     options: &CalibrationOptions,
 ) -> Calibration {
     let found = Calibration {
-        axis_hypothesis_lead: Some(other.ahead),
+        axis_hypothesis_lead: Some(other.lead),
         ..found
     };
     let reason = || other.hypothesis.reason(options.axes);
     match found.verdict {
-        // What leans fits better at another scale, and what is of another scale often leans: both are told.
+        // Tilt and scale are coupled: a tilted cloud fits better at another scale, and the reverse. The reason names
+        // both.
         Verdict::RejectedInput if other.hypothesis.is_scaled() => Calibration {
-            reason: match other.is_certain && !found.is_about(other.hypothesis.scale()) {
+            reason: match other.is_accepted && !found.is_about(other.hypothesis.scale()) {
                 true => format!("{}; or it {}", found.reason, reason()),
                 false => found.reason,
             },
             ..found
         },
-        _ if other.is_certain => Calibration {
+        _ if other.is_accepted => Calibration {
             verdict: Verdict::RejectedInput,
             reason: format!("the cloud {}", reason()),
             scale: match other.hypothesis.is_scaled() {
@@ -157,7 +161,7 @@ fn read_as(
             },
             ..found
         },
-        Verdict::Ok if other.is_possible() => Calibration {
+        Verdict::Ok if other.is_plausible() => Calibration {
             verdict: Verdict::Ambiguous,
             reason: format!("perhaps the cloud {}", reason()),
             ..found
@@ -167,20 +171,20 @@ fn read_as(
 }
 
 impl Calibration {
-    /// True if the scale that was estimated is about another one.
+    /// Tests whether the estimated scale nearly equals `scale`.
     fn is_about(&self, scale: f64) -> bool {
         let estimate = self.scale.map_or(1.0, |estimate| estimate.scale);
         (estimate / scale).ln().abs() < ABOUT
     }
 }
 
-/// The candidate that most speaks for.
+/// Candidate with the largest total log-likelihood; the first of equal ones.
 fn most_likely(all: &[Candidate]) -> Option<&Candidate> {
     all.iter()
         .reduce(|a, b| if b.total() > a.total() { b } else { a })
 }
 
-/// Reports progress; ends the calibration if the caller wants that.
+/// Reports progress; fails if the caller cancels the registration.
 fn step(progress: &dyn Progress, stage: Stage, fraction: f64) -> Result<(), Refusal> {
     match progress.report(stage, fraction) {
         ControlFlow::Continue(()) => Ok(()),
@@ -188,12 +192,13 @@ fn step(progress: &dyn Progress, stage: Stage, fraction: f64) -> Result<(), Refu
     }
 }
 
+/// Searches for poses by the positions and orientations of surfaces.
 fn by_surfaces(context: &RegistrationContext<'_>, region: Option<&Region>) -> Vec<Hypothesis> {
     let source = SearchSource::by_surface(&context.source.coarse, context.source.sensor_m);
     search(&context.map.surfaces, &source, region, BY_SURFACES)
 }
 
-/// Poses that the labels fit, as far as it is known how they go together.
+/// Searches for poses by the labels, with the lift of their co-occurrence as the score.
 fn by_labels(context: &RegistrationContext<'_>, region: Option<&Region>) -> Vec<Hypothesis> {
     let (coarse, map) = (&context.source.coarse, &context.map.cloud);
     if !coarse.is_labelled() || !map.is_labelled() {
@@ -204,7 +209,7 @@ fn by_labels(context: &RegistrationContext<'_>, region: Option<&Region>) -> Vec<
     let score = |i: usize, channel: usize| {
         let class = classes.get(channel).copied().unwrap_or_default();
         let lift = lift.expected(&LabelDistribution::hard(class), &map.label(i));
-        // From 0 for a quarter of chance to 100 for four times of it.
+        // Score 0 at a lift of 1/4, 50 at 1, 100 at 4.
         (50.0 * (1.0 + lift.clamp(0.25, 4.0).ln() / 4.0_f64.ln())) as u8
     };
     let channels: Vec<Option<usize>> = (0..coarse.len())
@@ -223,6 +228,7 @@ fn by_labels(context: &RegistrationContext<'_>, region: Option<&Region>) -> Vec<
     search(&labels, &source, region, BY_LABELS)
 }
 
+/// Most frequent classes of a cloud, in descending order of their counts.
 fn frequent_classes(cloud: &PreparedCloud) -> Vec<u16> {
     let mut counts = std::collections::BTreeMap::new();
     for class in (0..cloud.len()).filter_map(|i| cloud.label(i).top()) {
@@ -234,10 +240,10 @@ fn frequent_classes(cloud: &PreparedCloud) -> Vec<u16> {
     classes.into_iter().map(|(class, _)| class).collect()
 }
 
-/// Poses that the methods reach from a given start, GICP-SE(3) first.
+/// Refines the initial guess with all methods; the result of GICP-SE(3) comes first.
 fn from_start(context: &RegistrationContext<'_>, start: &Isometry3<f64>) -> Vec<Candidate> {
     let (source, map) = (&context.source.full, &context.map.cloud);
-    // As published, with its wide gate: it comes from farther than ours, and stands where it is right.
+    // The published gate is wider and converges from farther away.
     let published = register(source, map, start, &RegisterOptions::gicp_se3());
     let mut all = vec![context.evaluate(&context.fit, published.target_from_source, "gicp")];
     all.extend(context.refine_with_all_methods(start, "gicp"));
