@@ -9,8 +9,8 @@ use super::super::search::Hypothesis;
 use super::super::{Confusion, LabelUse, PreparedCloud, RegisterOptions, register};
 use super::map::CalibrationMap;
 use super::rays::blocked_fraction;
+use super::request::CalibrationOptions;
 use super::source::PreparedSource;
-use super::types::CalibrationOptions;
 
 /// Gauss-Newton iterations of the coarse refinement.
 pub(super) const COARSE_STEPS: usize = 7;

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use rustc_hash::FxHashMap;
 
 use super::super::likelihood::quantile;
-use super::types::SourceCloud;
+use super::request::SourceCloud;
 
 /// Points that are looked at, at most; of more, some.
 const POINTS: usize = 200_000;

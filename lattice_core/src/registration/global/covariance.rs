@@ -8,7 +8,7 @@ use nalgebra::{
 
 use super::super::PreparedCloud;
 use super::super::likelihood::region_of;
-use super::types::{DirectionKind, WeakDirection};
+use super::calibration::{DirectionKind, WeakDirection};
 use crate::pose::se3;
 
 /// Distance in standard deviations at which a point counts half.

@@ -41,7 +41,7 @@ pub struct FitDiagnostics {
 
 impl FitDiagnostics {
     /// The regions that are not explained, in words; None if all are.
-    pub(super) fn in_words(&self) -> Option<String> {
+    pub(super) fn describe(&self) -> Option<String> {
         let first = self.unexplained.first()?;
         let [x, y, z] = [first.place_m.x, first.place_m.y, first.place_m.z];
         let regions = match self.unexplained.len() {

@@ -7,6 +7,7 @@
 
 mod alternatives;
 mod axis_hypotheses;
+mod calibration;
 mod candidates;
 mod cloud_statistics;
 mod covariance;
@@ -16,10 +17,10 @@ mod margin;
 mod profile;
 mod rays;
 mod reinterpreted_cloud;
+mod request;
 mod scale;
 mod source;
 mod track;
-mod types;
 mod verdict;
 mod weak_directions;
 
@@ -31,19 +32,19 @@ use rayon::prelude::*;
 use super::search::{Hypothesis, Region, SearchMap, SearchSource, search};
 use super::{LabelDistribution, PreparedCloud, RegisterOptions, register};
 use axis_hypotheses::{BestHypothesis, Refined, best_axis_hypothesis};
+use calibration::Refusal;
 use candidates::{Candidate, RegistrationContext};
 use source::PreparedSource;
-use types::Refusal;
 
+pub use calibration::{
+    Calibration, ClassReliability, DirectionKind, ScaleEstimate, Verdict, WeakDirection,
+};
 pub use fit_diagnostics::{FitDiagnostics, Unexplained, UnexplainedKind};
 pub use map::CalibrationMap;
 pub use margin::{Margin, p_wrong_in_words};
 pub use profile::Profile;
+pub use request::{CalibrationOptions, CalibrationRequest, Progress, SourceCloud, Stage};
 pub use track::{TrackUpdate, track};
-pub use types::{
-    Calibration, CalibrationOptions, CalibrationRequest, ClassReliability, DirectionKind, Progress,
-    ScaleEstimate, SourceCloud, Stage, Verdict, WeakDirection,
-};
 
 /// Hypotheses of the search by surfaces; many, because a planar patch fits many walls.
 const BY_SURFACES: usize = 128;

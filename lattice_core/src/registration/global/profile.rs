@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::cloud_statistics::CloudStatistics;
-use super::types::{CalibrationOptions, SourceCloud};
+use super::request::{CalibrationOptions, SourceCloud};
 
 /// Range beyond which a laser scanner outdoors is at work, metres.
 const LIDAR_M: f64 = 15.0;

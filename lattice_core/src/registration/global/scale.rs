@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 
 use super::super::PreparedCloud;
 use super::super::likelihood::region_of;
+use super::calibration::{Calibration, ScaleEstimate};
 use super::covariance::{ErrorModel, KERNEL};
-use super::types::{Calibration, CalibrationRequest, ScaleEstimate, SourceCloud};
+use super::request::{CalibrationRequest, SourceCloud};
 use crate::pose::se3;
 
 /// Steps of Gauss and Newton, with new partners before each.

@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, Point3};
 
 use super::super::{PrepareOptions, PreparedCloud, SemanticCloud, voxel_downsample};
-use super::types::{CalibrationOptions, CalibrationRequest, Refusal};
+use super::calibration::Refusal;
+use super::request::{CalibrationOptions, CalibrationRequest};
 
 /// Farthest that a point may be from the headset's origin, metres.
 const MAX_RANGE_M: f64 = 10_000.0;

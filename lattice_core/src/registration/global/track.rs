@@ -4,8 +4,8 @@ use nalgebra::Isometry3;
 
 use super::candidates::RegistrationContext;
 use super::map::CalibrationMap;
+use super::request::{CalibrationOptions, CalibrationRequest, SourceCloud};
 use super::source::PreparedSource;
-use super::types::{CalibrationOptions, CalibrationRequest, SourceCloud};
 use super::verdict::is_constrained;
 
 /// Log-likelihood by which a refined pose must be better to replace the old one.

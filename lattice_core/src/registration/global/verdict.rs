@@ -1,51 +1,56 @@
-//! Choice of the winning candidate, and the verdict on it.
+//! Selection of a candidate, its covariance and its verdict.
 
 use nalgebra::{Isometry3, Matrix6, Vector3};
 
 use super::super::likelihood::Partners;
+use super::calibration::{
+    Calibration, ClassReliability, DirectionKind, ScaleEstimate, Verdict, WeakDirection,
+};
 use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::{ErrorModel, PoseCovariance};
 use super::fit_diagnostics::{FitDiagnostics, fit_diagnostics};
 use super::margin::{Margin, SOFTNESS, p_wrong_in_words};
 use super::most_likely;
+use super::request::CalibrationOptions;
 use super::scale::scale_at;
-use super::types::{
-    Calibration, CalibrationOptions, ClassReliability, DirectionKind, ScaleEstimate, Verdict,
-    WeakDirection,
-};
 
-/// Observations without a partner that one counts as whose line of sight the map contradicts.
+/// Penalty weight: a line of sight that the map contradicts counts as three outliers.
 const CONTRADICTION_PENALTY: f64 = 3.0;
-/// Candidates elsewhere that count, at most.
+/// Maximum number of alternatives that enter the margin.
 const MAX_ALTERNATIVES: usize = 16;
-/// Largest ratio of the error of a region to its residuals.
-const INVISIBLE: f64 = 4.0;
-/// Extent of a cloud over the root mean square distance of its points from their midst, about.
+/// Largest ratio of the error of a region to the RMS residual.
+const MAX_ERROR_RATIO: f64 = 4.0;
+/// Typical ratio of the extent of a cloud to the RMS distance of its points from their centroid.
 const EXTENT: f64 = 3.5;
-/// Regions along the extent of a cloud from which on it is large, and smaller ones along that of one which is not.
+/// Extent of a large cloud, in regions.
 const LARGE: f64 = 2.0;
+/// Number of smaller regions along the extent of a cloud that is not large.
 const REGIONS: f64 = 4.0;
-/// Standard deviations of the tilt beyond which a pose certainly leans.
-const LEANING: f64 = 5.0;
-/// Log-likelihood that another scale must gain to be certain, and the same of an observation: right looks on warped
-/// meshes gain less than a tenth, clouds that are 5 % too small or too large one and more.
+/// Tilt beyond which a pose is rejected, in standard deviations.
+const MAX_TILT_SIGMAS: f64 = 5.0;
+/// Log-likelihood gain above which another scale is accepted.
 const SCALE_GAIN: f64 = 40.0;
-const SCALE_GAIN_OF_ONE: f64 = 0.3;
-/// Share of the points that another scale may leave without a partner and still be better.
-const FEWER: f64 = 0.02;
-/// Distance from surfaces, metres, below which points are not told to be closer.
-const CLOSEST_M: f64 = 1e-3;
-/// GICP from a given start stands unless another is better by this log-likelihood.
-const DISPLACE: f64 = 10.0;
+/// The same per observation: correct poses on warped meshes gain less than 0.1, clouds with a scale error of 5 % at
+/// least 1.
+const SCALE_GAIN_PER_OBSERVATION: f64 = 0.3;
+/// Largest loss of the inlier fraction at another scale.
+const MAX_INLIER_LOSS: f64 = 0.02;
+/// RMS distance from surfaces below which differences do not count, metres.
+const MIN_RMSE_M: f64 = 1e-3;
+/// Log-likelihood ratio above which another pose replaces the result of GICP-SE(3) from the initial guess.
+const REPLACE_LEAD: f64 = 10.0;
 
-/// Chooses among candidates. With `started`, the first is what GICP makes of the start.
+/// Selects a candidate and classifies it. With `started`, the first candidate is GICP-SE(3) from the initial guess.
 pub(super) fn select_and_classify(
     context: &RegistrationContext<'_>,
     all: Vec<Candidate>,
     started: bool,
 ) -> Calibration {
     let Some(best) = select(context, &all, started) else {
-        return Calibration::refused(Verdict::NoOverlap, "no place was found");
+        return Calibration::refused(
+            Verdict::NoOverlap,
+            "no place was found: the search has no candidate pose",
+        );
     };
     let centroid = context.centroid();
     let (shift_m, turn_rad) = context.min_separation();
@@ -66,31 +71,31 @@ pub(super) fn select_and_classify(
             },
         )
     });
-    // Both frames know where down is; but what GICP made of a start stands as it is.
+    // Both frames are gravity-aligned, but the result of GICP-SE(3) from a guess is returned unchanged.
     let gravity = context.options.gravity_sigma_rad;
-    let stands = started && all.first().is_some_and(|gicp| std::ptr::eq(gicp, best));
+    let is_from_start = started && all.first().is_some_and(|gicp| std::ptr::eq(gicp, best));
     let upright = (covariance.as_ref())
         .filter(|_| gravity.is_finite())
         .map(|covariance| covariance.upright(&pose, gravity));
-    let leans = upright == Some(None);
+    let is_tilted = upright == Some(None);
     let (pose, covariance) = match upright.flatten() {
-        Some((pose, sure)) if !stands => (pose, Some(sure)),
+        Some((pose, sure)) if !is_from_start => (pose, Some(sure)),
         _ => (pose, covariance),
     };
     let options = context.options;
     let weak = covariance.as_ref().map(|sure| weak(context, sure, &pose));
     let weak = weak.unwrap_or_default();
-    let held = covariance.is_some();
-    let (mut verdict, mut reason) = classify(options, best, &margin, &fit, held, &weak);
+    let is_constrained = covariance.is_some();
+    let (mut verdict, mut reason) = classify(options, best, &margin, &fit, is_constrained, &weak);
     let scale = scale(context, best);
     if best.inlier_fraction >= options.min_inliers
-        && let Some(fault) = tilt_fault(&pose, leans, options)
+        && let Some(fault) = tilt_fault(&pose, is_tilted, options)
             .or_else(|| scale_fault(scale, context.fit.observations(), options))
     {
         (verdict, reason) = (Verdict::RejectedInput, fault);
     }
     if let Some(regions) = (verdict != Verdict::RejectedInput)
-        .then(|| fit.in_words())
+        .then(|| fit.describe())
         .flatten()
     {
         reason = format!("{reason}; {regions}");
@@ -118,7 +123,7 @@ pub(super) fn select_and_classify(
     }
 }
 
-/// Margin of a pose over the best candidates elsewhere.
+/// Margin of a pose over its best alternatives.
 fn margin(
     context: &RegistrationContext<'_>,
     all: &[Candidate],
@@ -127,7 +132,7 @@ fn margin(
 ) -> Margin {
     let outlier = context.fit.outlier_log_likelihood();
     let mut alternatives = context.alternatives(all, best, MAX_ALTERNATIVES);
-    // The chances of those that are far behind matter only if there are no others.
+    // Alternatives far behind count only if there are no others.
     let competitive = alternatives
         .iter()
         .filter(|alternative| context.is_competitive(alternative, best));
@@ -147,7 +152,7 @@ fn margin(
     })
 }
 
-/// True if the surfaces hold a pose in all directions, as an answer must that is OK.
+/// Tests whether the surfaces constrain a pose in all directions, as the verdict `OK` requires.
 pub(super) fn is_constrained(context: &RegistrationContext<'_>, candidate: &Candidate) -> bool {
     let pose = &candidate.target_from_source;
     let sure = covariance(context, candidate);
@@ -155,7 +160,7 @@ pub(super) fn is_constrained(context: &RegistrationContext<'_>, candidate: &Cand
     sure.is_some_and(|sure| weak(context, &sure, pose).is_empty())
 }
 
-/// Directions in which a pose is not known well enough.
+/// Directions whose standard deviation exceeds its limit.
 fn weak(
     context: &RegistrationContext<'_>,
     covariance: &PoseCovariance,
@@ -166,19 +171,24 @@ fn weak(
     directions
 }
 
-/// Says that a pose does not stand upright, though both frames know where down is.
-fn tilt_fault(pose: &Isometry3<f64>, leans: bool, options: &CalibrationOptions) -> Option<String> {
+/// Reason to reject a tilted pose, since gravity is along -z of both frames.
+fn tilt_fault(
+    pose: &Isometry3<f64>,
+    is_tilted: bool,
+    options: &CalibrationOptions,
+) -> Option<String> {
     let angle_rad = (pose.rotation * Vector3::z()).angle(&Vector3::z());
-    let beyond = leans && angle_rad > LEANING * options.gravity_sigma_rad;
+    let beyond = is_tilted && angle_rad > MAX_TILT_SIGMAS * options.gravity_sigma_rad;
     beyond.then(|| {
         let degrees = angle_rad.to_degrees();
+        let most = (MAX_TILT_SIGMAS * options.gravity_sigma_rad).to_degrees();
         format!(
-            "the cloud leans by {degrees:.1} degrees in the map: gravity must be along -z of both"
+            "the cloud leans by {degrees:.1} degrees in the map, above {most:.1} degrees: gravity must be along -z of both"
         )
     })
 }
 
-/// Says that the points are of another scale than the map.
+/// Reason to reject points whose scale differs from that of the map.
 fn scale_fault(
     scale: Option<ScaleEstimate>,
     observations: f64,
@@ -186,17 +196,17 @@ fn scale_fault(
 ) -> Option<String> {
     let ScaleEstimate { scale, sigma, gain } = scale.filter(|_| !options.estimate_scale)?;
     let off = (scale - 1.0).abs() > options.max_scale_error;
-    let is_certain = gain > SCALE_GAIN.max(SCALE_GAIN_OF_ONE * observations);
+    let is_certain = gain > SCALE_GAIN.max(SCALE_GAIN_PER_OBSERVATION * observations);
     (off && is_certain).then(|| {
         let most = 100.0 * options.max_scale_error;
         format!(
-            "the cloud fits with its points multiplied by {scale:.3}, standard deviation {sigma:.3}: \
-             the scale may be off by {most:.0} %, check its unit"
+            "the cloud fits with its points multiplied by {scale:.3}, standard deviation {sigma:.3}: the scale error \
+             exceeds {most:.0} % (`max_scale_error`), check its unit"
         )
     })
 }
 
-/// The most_likely, but what GICP makes of a start if that is the same place or nearly as likely.
+/// Selects the most likely candidate; prefers GICP-SE(3) from the initial guess if it is near or nearly as likely.
 fn select<'a>(
     context: &RegistrationContext<'_>,
     all: &'a [Candidate],
@@ -206,7 +216,7 @@ fn select<'a>(
     let Some(gicp) = all.first().filter(|_| started) else {
         return Some(best);
     };
-    // A little to the side of what GICP found is hardly better, whatever the likelihood says.
+    // Near the result of GICP-SE(3), a difference of the likelihoods is not significant.
     let (shift_m, turn_rad) = (3.0 * context.map.spacing_m, 0.09);
     let beside = gicp.is_near(
         &best.target_from_source,
@@ -215,8 +225,8 @@ fn select<'a>(
         turn_rad,
     );
     let least = match beside {
-        true => DISPLACE.max(0.2 * context.fit.observations()),
-        false => DISPLACE,
+        true => REPLACE_LEAD.max(0.2 * context.fit.observations()),
+        false => REPLACE_LEAD,
     };
     Some(match best.total() < gicp.total() + least {
         true => gicp,
@@ -224,19 +234,21 @@ fn select<'a>(
     })
 }
 
+/// Verdict on the selected candidate, with its reason.
 fn classify(
     options: &CalibrationOptions,
     best: &Candidate,
     margin: &Margin,
     fit: &FitDiagnostics,
-    held: bool,
+    is_constrained: bool,
     weak: &[WeakDirection],
 ) -> (Verdict, String) {
     let percent = 100.0 * best.inlier_fraction;
     if best.inlier_fraction < options.min_inliers {
         let least = 100.0 * options.min_inliers;
-        let reason =
-            format!("only {percent:.0} % of the points lie on the map, {least:.0} % are needed");
+        let reason = format!(
+            "only {percent:.0} % of the points lie on the map, below {least:.0} % (`min_inliers`)"
+        );
         return (Verdict::NoOverlap, reason);
     }
     if fit.floating + fit.blocked > options.max_contradicted {
@@ -246,8 +258,8 @@ fn classify(
     if p_wrong > options.max_p_wrong {
         let least = margin.at(options.max_p_wrong);
         let reason = format!(
-            "another pose is right with a probability of {p_wrong:.2}: log-margin {log:.1}, {least:.0} is needed; \
-             look elsewhere too"
+            "another pose is right with a probability of {p_wrong:.2}: log-margin {log:.1} is below {least:.0}; \
+             scan other parts of the place too"
         );
         return (Verdict::Ambiguous, reason);
     }
@@ -255,18 +267,21 @@ fn classify(
         let [x, y, z] = [worst.axis.x, worst.axis.y, worst.axis.z];
         let reason = match worst.kind {
             DirectionKind::Translation => format!(
-                "the pose may slide along ({x:.2}, {y:.2}, {z:.2}): standard deviation {:.2} m",
+                "position is weak along ({x:.2}, {y:.2}, {z:.2}): standard deviation {:.2} m",
                 worst.sigma
             ),
             DirectionKind::Rotation => format!(
-                "the pose may turn about ({x:.2}, {y:.2}, {z:.2}): standard deviation {:.1} degrees",
+                "orientation is weak about ({x:.2}, {y:.2}, {z:.2}): standard deviation {:.1} degrees",
                 worst.sigma.to_degrees()
             ),
         };
         return (Verdict::Degenerate, reason);
     }
-    if !held {
-        return (Verdict::Degenerate, "too few surfaces hold the pose".into());
+    if !is_constrained {
+        return (
+            Verdict::Degenerate,
+            "too few surfaces constrain the pose".into(),
+        );
     }
     let reason = format!(
         "{percent:.0} % of the points lie on the map, log-margin {log:.0}, {}",
@@ -275,17 +290,18 @@ fn classify(
     (Verdict::Ok, reason)
 }
 
-/// Says that the map speaks against a pose.
+/// Reason to reject a pose that the free space of the map contradicts.
 fn contradiction(fit: &FitDiagnostics, options: &CalibrationOptions) -> String {
     let [floating, blocked, most] =
         [fit.floating, fit.blocked, options.max_contradicted].map(|share| 100.0 * share);
     format!(
-        "the map contradicts the cloud: {floating:.0} % of its points float before surfaces of the map, {blocked:.0} % \
-         are seen through one, {most:.0} % together are allowed; it is of another place, or much has moved"
+        "the map contradicts the cloud: {floating:.0} % of its points are floating in front of surfaces of the map, \
+         {blocked:.0} % are hidden behind one, above {most:.0} % together (`max_contradicted`); the cloud is of another \
+         place, or objects have moved"
     )
 }
 
-/// Covariance of a candidate's pose by the surfaces; None if they do not hold it at all.
+/// Covariance of a candidate's pose from the surfaces; `None` if they do not constrain it.
 pub(super) fn covariance(
     context: &RegistrationContext<'_>,
     best: &Candidate,
@@ -295,6 +311,7 @@ pub(super) fn covariance(
     PoseCovariance::at(source, target, &best.target_from_source, &model)
 }
 
+/// Scale estimated with the pose of a candidate.
 fn scale(context: &RegistrationContext<'_>, best: &Candidate) -> Option<ScaleEstimate> {
     let (source, target) = (&context.source.full, &context.map.cloud);
     let model = error_model(context, best);
@@ -308,17 +325,18 @@ fn scale(context: &RegistrationContext<'_>, best: &Candidate) -> Option<ScaleEst
     })
 }
 
-/// Log-likelihood of a normal distribution whose deviation is that of the points, at partners that another scale
-/// gives, above that of the pose as it is; 0 if it leaves points without partners.
+/// Log-likelihood gained by another scale, for normally distributed residuals; 0 if points lose their
+/// correspondences.
 fn gain(observations: f64, best: &Candidate, scaled: &Partners) -> f64 {
-    if scaled.inlier_fraction < best.inlier_fraction - FEWER {
+    if scaled.inlier_fraction < best.inlier_fraction - MAX_INLIER_LOSS {
         return 0.0;
     }
     let both = scaled.inlier_fraction.min(best.inlier_fraction);
-    let closer = (best.rmse_m.max(CLOSEST_M) / scaled.rmse_m.max(CLOSEST_M)).ln();
+    let closer = (best.rmse_m.max(MIN_RMSE_M) / scaled.rmse_m.max(MIN_RMSE_M)).ln();
     both * observations * closer
 }
 
+/// Error model of the source at a candidate's pose.
 fn error_model(context: &RegistrationContext<'_>, best: &Candidate) -> ErrorModel {
     let options = context.options;
     let extent_m = EXTENT * context.reach_m();
@@ -326,8 +344,8 @@ fn error_model(context: &RegistrationContext<'_>, best: &Candidate) -> ErrorMode
     ErrorModel {
         region_m: options.region_m,
         within_m: is_small.then_some(extent_m / REGIONS),
-        // A cloud that fits far closer than expected also errs less as a whole.
-        sigma_m: options.noise_m.min(INVISIBLE * best.rmse_m),
+        // A cloud whose residuals are far below the expected noise also has smaller region errors.
+        sigma_m: options.noise_m.min(MAX_ERROR_RATIO * best.rmse_m),
         point_m: best.rmse_m,
         spacing_m: context.map.spacing_m,
         scale_sigma: options.scale_sigma,
@@ -339,6 +357,7 @@ fn error_model(context: &RegistrationContext<'_>, best: &Candidate) -> ErrorMode
     }
 }
 
+/// Agreement of each source class with the map at a candidate's pose.
 fn reliability(best: &Candidate) -> Vec<ClassReliability> {
     let mut classes: Vec<u16> = best.confusion.pairs().iter().map(|p| p.0).collect();
     classes.dedup();

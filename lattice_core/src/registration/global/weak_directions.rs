@@ -3,10 +3,10 @@
 use nalgebra::{Isometry3, Point3, RowVector6, Vector6};
 use rayon::prelude::*;
 
+use super::calibration::{DirectionKind, WeakDirection};
 use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::PoseCovariance;
 use super::margin::SOFTNESS;
-use super::types::{DirectionKind, WeakDirection};
 use super::verdict::covariance;
 use crate::pose::se3;
 
@@ -42,7 +42,7 @@ impl RegistrationContext<'_> {
         })
     }
 
-    /// A candidate moved to where it is most_likely along the directions that surfaces and gravity leave weak, in which
+    /// A candidate moved to where it is most likely along the directions that surfaces and gravity leave weak, in which
     /// registration goes astray.
     pub fn optimize_weak_directions(&self, candidate: Candidate) -> Candidate {
         let begin = candidate.total();
@@ -65,7 +65,7 @@ impl RegistrationContext<'_> {
         })
     }
 
-    /// The most_likely of a candidate and those a step to both sides.
+    /// The most likely of a candidate and those a step to both sides.
     fn best_of_steps(&self, candidate: Candidate, along: &Direction, step: f64) -> Candidate {
         let sides = [step, -step].map(|step| self.moved(&candidate, along, step));
         let likelier = |a: Candidate, b: Candidate| if b.total() > a.total() { b } else { a };
@@ -191,8 +191,8 @@ impl PoseCovariance {
 #[cfg(test)]
 mod tests {
     use super::super::CalibrationMap;
+    use super::super::request::{CalibrationOptions, CalibrationRequest, SourceCloud};
     use super::super::source::PreparedSource;
-    use super::super::types::{CalibrationOptions, CalibrationRequest, SourceCloud};
     use super::*;
     use crate::registration::SemanticCloud;
     use nalgebra::{Matrix6, Vector3};
