@@ -22,7 +22,7 @@ pub use error::RegistrationError;
 pub use global::{
     Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, ClassReliability,
     DirectionKind, FitDiagnostics, Margin, Profile, Progress, ScaleEstimate, SourceCloud, Stage,
-    TrackUpdate, Unexplained, UnexplainedKind, Verdict, WeakDirection, p_wrong_in_words,
+    TrackUpdate, Unexplained, UnexplainedKind, Verdict, WeakDirection, describe_p_wrong,
     register_global, track,
 };
 pub use labels::{LabelDistribution, UNLABELED};

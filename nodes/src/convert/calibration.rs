@@ -35,7 +35,7 @@ pub fn result_from(found: &Calibration) -> CalibrationResult {
             false => verdict_code(found.verdict),
         },
         reason: found.reason.clone(),
-        log_margin: found.margin.log,
+        log_margin: found.margin.log_ratio,
         inlier_fraction: found.inlier_fraction,
         rmse_m: found.rmse_m,
         weak_directions: weak

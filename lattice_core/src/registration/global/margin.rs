@@ -1,115 +1,120 @@
-//! Margin of a pose over all others, and the probability that another is right.
+//! Margin of a pose over its alternatives, and the probability of error, p_wrong.
 
-use super::super::likelihood::Even;
+use super::super::likelihood::IndistinctDifference;
 
-/// Log-likelihood that is worth a natural logarithm of odds: observations are not independent.
+/// Log-likelihood per unit of log-odds: observations are correlated.
 pub(super) const SOFTNESS: f64 = 5.0;
-/// Logarithm of the odds that the square of a unit is worth.
-const SQUARE: f64 = 0.105;
-/// Least unit of a margin.
-const UNIT: f64 = 4.7;
-/// The unit for each observation without a partner, which might have one elsewhere.
-const PER_UNEXPLAINED: f64 = 0.075;
-/// Unit of what stands out from chance.
-const UNIT_OUT: f64 = 3.5;
-/// Logarithm of the odds that the square of a standard deviation of what may be chance is worth.
-const EVEN: f64 = 0.3;
-/// Least such deviation.
-const LEAST_CHANCE: f64 = 9.4;
-/// Least probability that is told: there are too few simulated poses to measure smaller ones.
-const LEAST_MEASURED: f64 = 1e-4;
+/// Log-odds of the squared margin, in units.
+const LOG_ODDS_PER_SQUARE: f64 = 0.105;
+/// Minimum unit of the margin.
+const MIN_UNIT: f64 = 4.7;
+/// Unit of the margin per outlier, which may be an inlier of an alternative.
+const UNIT_PER_OUTLIER: f64 = 0.075;
+/// Unit of the distinct part of the margin.
+const DISTINCT_UNIT: f64 = 3.5;
+/// Log-odds of the squared indistinct part, in standard deviations.
+const INDISTINCT_PER_SQUARE: f64 = 0.3;
+/// Minimum standard deviation of the indistinct part.
+const MIN_INDISTINCT_SIGMA: f64 = 9.4;
+/// Smallest reported probability: too few poses were simulated to measure smaller ones.
+const MIN_MEASURED: f64 = 1e-4;
 
-/// Evidence for a pose against all others.
+/// Evidence for a pose against its alternatives.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Margin {
-    /// Log-likelihood above that of the different pose that is most probably right in its place.
-    pub log: f64,
-    /// Part of it from where the points fit both poses about as well, which may be chance.
-    pub even: f64,
-    /// Standard deviation that chance gives that part.
-    pub chance: f64,
-    /// Independent observations that have no partner at the pose; more for those that the map contradicts.
-    pub unexplained: f64,
-    /// Number of other places, in which each counts by how probable it is beside the most probable one.
-    pub places: f64,
+    /// Log-likelihood ratio to the most probable alternative.
+    pub log_ratio: f64,
+    /// Part of the ratio from regions that fit both poses about equally well.
+    pub indistinct: f64,
+    /// Standard deviation of that part if both poses are equally right.
+    pub indistinct_sigma: f64,
+    /// Number of independent outliers; those that the map contradicts count threefold.
+    pub outliers: f64,
+    /// Effective number of alternatives, each weighted by its probability relative to the most probable one.
+    pub alternatives: f64,
 }
 
 impl Margin {
-    /// Over several other places, given the log-likelihood above each and how much of it may be chance; None over none.
+    /// Combines the log-likelihood ratios to several alternatives; `None` if there are none.
     pub(super) fn over(
-        places: impl IntoIterator<Item = (f64, Even)>,
-        unexplained: f64,
+        alternatives: impl IntoIterator<Item = (f64, IndistinctDifference)>,
+        outliers: f64,
     ) -> Option<Margin> {
-        let one = |(log, Even { log: even, chance })| Margin {
-            log,
-            even,
-            chance,
-            unexplained,
-            places: 1.0,
+        let one = |(log_ratio, indistinct): (f64, IndistinctDifference)| Margin {
+            log_ratio,
+            indistinct: indistinct.difference,
+            indistinct_sigma: indistinct.sigma,
+            outliers,
+            alternatives: 1.0,
         };
-        let mut all: Vec<Margin> = places.into_iter().map(one).collect();
-        all.sort_by(|a, b| a.against().total_cmp(&b.against()));
+        let mut all: Vec<Margin> = alternatives.into_iter().map(one).collect();
+        all.sort_by(|a, b| a.log_odds_over_one().total_cmp(&b.log_odds_over_one()));
         let most_likely = *all.first()?;
-        let beside = |place: &Margin| (most_likely.against() - place.against()).exp();
-        let others: f64 = all.iter().skip(1).map(beside).sum();
+        let weight =
+            |other: &Margin| (most_likely.log_odds_over_one() - other.log_odds_over_one()).exp();
+        let others: f64 = all.iter().skip(1).map(weight).sum();
         Some(Margin {
-            places: 1.0 + others,
+            alternatives: 1.0 + others,
             ..most_likely
         })
     }
 
-    /// Probability that the pose is wrong, and another one right.
+    /// Probability that the pose is wrong and an alternative is right.
     ///
-    /// Odds fall with the square of the margin, but no more than what chance does not make speaks for; the constants
-    /// are fitted to simulated scenes and a room, see `docs/calibration.md`.
+    /// Log-odds grow with the square of the margin, limited by its distinct part. The constants are fitted to
+    /// simulated scenes and a room, see `docs/calibration.md`.
     pub fn p_wrong(&self) -> f64 {
-        1.0 / (1.0 + (self.against() - self.without()).exp())
+        1.0 / (1.0 + (self.log_odds_over_one() - self.log_alternatives()).exp())
     }
 
-    /// The margin at which the pose is wrong with a probability, if all that is added stands out from chance.
-    pub fn at(&self, p_wrong: f64) -> f64 {
-        let odds = ((1.0 - p_wrong) / p_wrong).ln() + self.without();
-        let out = UNIT_OUT * root((odds - self.by_chance()) / SQUARE);
-        (self.unit() * root(odds / SQUARE)).max(self.even + out)
+    /// Log-likelihood ratio at which `p_wrong` is reached if all further evidence is distinct.
+    pub fn threshold(&self, p_wrong: f64) -> f64 {
+        let odds = ((1.0 - p_wrong) / p_wrong).ln() + self.log_alternatives();
+        let distinct =
+            DISTINCT_UNIT * signed_root((odds - self.indistinct_log_odds()) / LOG_ODDS_PER_SQUARE);
+        (self.unit() * signed_root(odds / LOG_ODDS_PER_SQUARE)).max(self.indistinct + distinct)
     }
 
-    /// Logarithm of the odds that it is wrong without a margin.
-    fn without(&self) -> f64 {
-        self.places.max(1.0).ln()
+    /// Log-odds of an error at a margin of zero.
+    fn log_alternatives(&self) -> f64 {
+        self.alternatives.max(1.0).ln()
     }
 
-    /// Logarithm of the odds against one other place.
-    fn against(&self) -> f64 {
-        let by_all = SQUARE * squared(self.log / self.unit());
-        let by_what_stands_out = SQUARE * squared((self.log - self.even) / UNIT_OUT);
-        by_all.min(by_what_stands_out + self.by_chance())
+    /// Log-odds over one alternative.
+    fn log_odds_over_one(&self) -> f64 {
+        let by_total = LOG_ODDS_PER_SQUARE * signed_square(self.log_ratio / self.unit());
+        let by_distinct =
+            LOG_ODDS_PER_SQUARE * signed_square((self.log_ratio - self.indistinct) / DISTINCT_UNIT);
+        by_total.min(by_distinct + self.indistinct_log_odds())
     }
 
-    /// Logarithm of the odds against one other place by what may be chance.
-    fn by_chance(&self) -> f64 {
-        EVEN * squared(self.even / self.chance.max(LEAST_CHANCE))
+    /// Log-odds over one alternative from the indistinct part.
+    fn indistinct_log_odds(&self) -> f64 {
+        INDISTINCT_PER_SQUARE
+            * signed_square(self.indistinct / self.indistinct_sigma.max(MIN_INDISTINCT_SIGMA))
     }
 
+    /// Log-likelihood per unit of the margin.
     fn unit(&self) -> f64 {
-        UNIT.max(PER_UNEXPLAINED * self.unexplained)
+        MIN_UNIT.max(UNIT_PER_OUTLIER * self.outliers)
     }
 }
 
-/// Square with the sign of the number.
-fn squared(x: f64) -> f64 {
+/// Square with the sign of `x`.
+fn signed_square(x: f64) -> f64 {
     x * x.abs()
 }
 
-/// The number of which [`squared`] is the square.
-fn root(x: f64) -> f64 {
+/// Inverse of [`signed_square`].
+fn signed_root(x: f64) -> f64 {
     x.abs().sqrt().copysign(x)
 }
 
-/// Probability that a pose is wrong, in words; below 1e-4 no number is told.
-pub fn p_wrong_in_words(p_wrong: f64) -> String {
+/// Formats the probability of error, bounded below by 1e-4.
+pub fn describe_p_wrong(p_wrong: f64) -> String {
     match p_wrong {
-        p if p < LEAST_MEASURED => format!("wrong with a probability below {LEAST_MEASURED:.0e}"),
-        p => format!("wrong with a probability of {p:.0e}"),
+        p if p < MIN_MEASURED => format!("probability of error below {MIN_MEASURED:.0e}"),
+        p => format!("probability of error {p:.0e}"),
     }
 }
 
@@ -117,85 +122,88 @@ pub fn p_wrong_in_words(p_wrong: f64) -> String {
 mod tests {
     use super::*;
 
-    /// A margin that stands out from chance.
-    fn margin(log: f64, unexplained: f64) -> Margin {
+    /// A margin whose difference is distinct.
+    fn margin(log_ratio: f64, outliers: f64) -> Margin {
         Margin {
-            log,
-            chance: 5.0,
-            unexplained,
-            places: 1.0,
+            log_ratio,
+            indistinct_sigma: 5.0,
+            outliers,
+            alternatives: 1.0,
             ..Margin::default()
         }
     }
 
     #[test]
-    fn the_more_speaks_for_a_pose_the_less_is_it_wrong() {
+    fn p_wrong_falls_with_the_log_ratio() {
         let tie = margin(0.0, 10.0).p_wrong();
         assert_eq!(tie, 0.5);
         let sure = margin(60.0, 10.0);
         assert!(sure.p_wrong() < 0.01 && margin(30.0, 10.0).p_wrong() > 0.01);
-        // What is not explained counts against it.
+        // Outliers reduce the evidence.
         assert!(margin(60.0, 200.0).p_wrong() > sure.p_wrong());
-        assert!((margin(sure.at(0.01), 10.0).p_wrong() - 0.01).abs() < 1e-12);
-        assert!((margin(sure.at(0.9), 10.0).p_wrong() - 0.9).abs() < 1e-12);
-        // What stands by a start may be behind another.
+        assert!((margin(sure.threshold(0.01), 10.0).p_wrong() - 0.01).abs() < 1e-12);
+        assert!((margin(sure.threshold(0.9), 10.0).p_wrong() - 0.9).abs() < 1e-12);
+        // The pose from a guess may be behind an alternative.
         assert!(margin(-60.0, 10.0).p_wrong() > 0.99);
         assert_eq!(margin(f64::INFINITY, 10.0).p_wrong(), 0.0);
     }
 
     #[test]
-    fn what_chance_makes_is_not_enough() {
-        let even = |log: f64, even: f64, chance: f64| Margin {
-            even,
-            chance,
-            ..margin(log, 0.0)
+    fn an_indistinct_difference_is_not_enough() {
+        let indistinct = |log_ratio: f64, indistinct: f64, indistinct_sigma: f64| Margin {
+            indistinct,
+            indistinct_sigma,
+            ..margin(log_ratio, 0.0)
         };
         assert!(margin(40.0, 0.0).p_wrong() < 0.01);
-        // Three deviations and a half of what may be chance, as places that are alike have now and then.
-        assert!(even(42.0, 42.0, 12.0).p_wrong() > 0.01);
-        assert!(even(60.0, 60.0, 12.0).p_wrong() < 0.01);
-        // With it what stands out is enough that alone would be too.
-        assert!(even(60.0, 20.0, 12.0).p_wrong() < 0.01);
-        for margin in [even(42.0, 42.0, 12.0), even(9.0, 20.0, 12.0)] {
-            let log = margin.at(0.01);
-            let there = Margin { log, ..margin };
+        // 3.5 standard deviations of the indistinct part, as alike places sometimes reach.
+        assert!(indistinct(42.0, 42.0, 12.0).p_wrong() > 0.01);
+        assert!(indistinct(60.0, 60.0, 12.0).p_wrong() < 0.01);
+        // With an indistinct part, a distinct part suffices that suffices alone.
+        assert!(indistinct(60.0, 20.0, 12.0).p_wrong() < 0.01);
+        for margin in [indistinct(42.0, 42.0, 12.0), indistinct(9.0, 20.0, 12.0)] {
+            let log_ratio = margin.threshold(0.01);
+            let there = Margin {
+                log_ratio,
+                ..margin
+            };
             assert!((there.p_wrong() - 0.01).abs() < 1e-12);
         }
     }
 
     #[test]
-    fn places_count_by_how_probable_they_are() {
+    fn alternatives_count_by_their_probability() {
         let p_wrong = |places: &[(f64, f64)]| {
-            let even = |log, chance| Even { log, chance };
+            let indistinct = |difference, sigma| IndistinctDifference { difference, sigma };
             let places = places
                 .iter()
-                .map(|(log, by_chance)| (*log, even(*by_chance, 12.0)));
+                .map(|(log, by_chance)| (*log, indistinct(*by_chance, 12.0)));
             Margin::over(places, 10.0).unwrap().p_wrong()
         };
         let odds = |p: f64| p / (1.0 - p);
-        // Of four places that fit alike the others are three times as probable as one of two.
+        // Of four equal poses, the other three are three times as probable as the other one of two.
         let four = odds(p_wrong(&[(0.0, 0.0); 3]));
         assert!((four / odds(p_wrong(&[(0.0, 0.0)])) - 3.0).abs() < 1e-9);
         let one = p_wrong(&[(25.0, 0.0)]);
         assert!((odds(p_wrong(&[(25.0, 0.0), (25.0, 0.0)])) / odds(one) - 2.0).abs() < 1e-9);
         assert!((p_wrong(&[(25.0, 0.0), (900.0, 0.0)]) - one).abs() < 1e-12);
-        // A place that is behind by more may still be the likelier one, if chance may have made that.
+        // An alternative further behind may be more probable if the difference is indistinct.
         let (clear, by_chance) = (
-            Even::default(),
-            Even {
-                log: 40.0,
-                chance: 20.0,
+            IndistinctDifference::default(),
+            IndistinctDifference {
+                difference: 40.0,
+                sigma: 20.0,
             },
         );
         let margin = Margin::over([(30.0, clear), (40.0, by_chance)], 10.0).unwrap();
-        assert_eq!((margin.log, margin.even), (40.0, 40.0));
-        assert!(margin.places < 1.1 && margin.places > 1.0);
+        assert_eq!((margin.log_ratio, margin.indistinct), (40.0, 40.0));
+        assert!(margin.alternatives < 1.1 && margin.alternatives > 1.0);
         assert_eq!(Margin::over([], 10.0), None);
     }
 
     #[test]
-    fn a_probability_too_small_to_measure_is_told_as_that() {
-        assert!(p_wrong_in_words(0.0042).ends_with("of 4e-3"));
-        assert!(p_wrong_in_words(1e-69).ends_with("below 1e-4"));
+    fn a_probability_too_small_to_measure_is_a_bound() {
+        assert!(describe_p_wrong(0.0042).ends_with("error 4e-3"));
+        assert!(describe_p_wrong(1e-69).ends_with("below 1e-4"));
     }
 }

@@ -1,7 +1,7 @@
 //! Global registration of source clouds in a target map, without an initial guess, with a verdict on the result.
 //!
 //! Hypotheses of all poses come from a search by surfaces and one by labels. The best are refined by GICP-SE(3) and
-//! by Semantic-ICP with learned labels. One likelihood ([`RegistrationContext::fit`]) ranks them. Labels contribute
+//! by Semantic-ICP with learned labels. One likelihood ranks them. Labels contribute
 //! as far as they predict each other across folds of the source. With an initial guess, the result of GICP-SE(3) from
 //! it is kept unless another pose is clearly more likely.
 
@@ -41,7 +41,7 @@ pub use calibration::{
 };
 pub use fit_diagnostics::{FitDiagnostics, Unexplained, UnexplainedKind};
 pub use map::CalibrationMap;
-pub use margin::{Margin, p_wrong_in_words};
+pub use margin::{Margin, describe_p_wrong};
 pub use profile::Profile;
 pub use request::{CalibrationOptions, CalibrationRequest, Progress, SourceCloud, Stage};
 pub use track::{TrackUpdate, track};

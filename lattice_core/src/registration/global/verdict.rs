@@ -9,7 +9,7 @@ use super::calibration::{
 use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::{ErrorModel, PoseCovariance};
 use super::fit_diagnostics::{FitDiagnostics, fit_diagnostics};
-use super::margin::{Margin, SOFTNESS, p_wrong_in_words};
+use super::margin::{Margin, SOFTNESS, describe_p_wrong};
 use super::most_likely;
 use super::request::CalibrationOptions;
 use super::scale::scale_at;
@@ -139,15 +139,17 @@ fn margin(
     alternatives.truncate(competitive.count().max(1));
     let poses: Vec<&Isometry3<f64>> = alternatives.iter().map(|c| &c.target_from_source).collect();
     let region_m = context.options.region_m;
-    let even = context.fit.even(&best.target_from_source, &poses, region_m);
+    let indistinct = context
+        .fit
+        .indistinct_differences(&best.target_from_source, &poses, region_m);
     let ahead = |alternative: &&Candidate| best.total() - alternative.total().max(outlier);
-    let places = alternatives.iter().map(ahead).zip(even);
+    let log_ratios = alternatives.iter().map(ahead).zip(indistinct);
     let contradicted = CONTRADICTION_PENALTY * (fit.floating + fit.blocked);
-    let unexplained = context.fit.observations() * (1.0 - best.inlier_fraction + contradicted);
-    let margin = Margin::over(places, unexplained);
+    let outliers = context.fit.observations() * (1.0 - best.inlier_fraction + contradicted);
+    let margin = Margin::over(log_ratios, outliers);
     margin.unwrap_or_else(|| Margin {
-        log: best.total() - outlier,
-        unexplained,
+        log_ratio: best.total() - outlier,
+        outliers,
         ..Margin::default()
     })
 }
@@ -254,9 +256,9 @@ fn classify(
     if fit.floating + fit.blocked > options.max_contradicted {
         return (Verdict::NoOverlap, contradiction(fit, options));
     }
-    let (log, p_wrong) = (margin.log, margin.p_wrong());
+    let (log, p_wrong) = (margin.log_ratio, margin.p_wrong());
     if p_wrong > options.max_p_wrong {
-        let least = margin.at(options.max_p_wrong);
+        let least = margin.threshold(options.max_p_wrong);
         let reason = format!(
             "another pose is right with a probability of {p_wrong:.2}: log-margin {log:.1} is below {least:.0}; \
              scan other parts of the place too"
@@ -285,7 +287,7 @@ fn classify(
     }
     let reason = format!(
         "{percent:.0} % of the points lie on the map, log-margin {log:.0}, {}",
-        p_wrong_in_words(p_wrong)
+        describe_p_wrong(p_wrong)
     );
     (Verdict::Ok, reason)
 }

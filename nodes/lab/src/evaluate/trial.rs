@@ -102,13 +102,13 @@ impl Judged {
     pub fn p_wrong_by_margin(&self) -> Option<f64> {
         let parts = self.even.zip(self.chance);
         let evidence = self.margin.zip(parts).zip(self.unexplained);
-        let p_wrong = evidence.map(|((log, (even, chance)), unexplained)| {
+        let p_wrong = evidence.map(|((log_ratio, (indistinct, sigma)), outliers)| {
             let margin = Margin {
-                log,
-                even,
-                chance,
-                unexplained,
-                places: self.places.unwrap_or(1.0),
+                log_ratio,
+                indistinct,
+                indistinct_sigma: sigma,
+                outliers,
+                alternatives: self.places.unwrap_or(1.0),
             };
             margin.p_wrong()
         });
@@ -167,12 +167,15 @@ impl Trial {
                 verdict: calibration.verdict.name().to_owned(),
                 reason: calibration.reason.clone(),
                 chosen: calibration.method.to_owned(),
-                margin: margin.log.is_finite().then_some(rounded(margin.log)),
+                margin: margin
+                    .log_ratio
+                    .is_finite()
+                    .then_some(rounded(margin.log_ratio)),
                 p_wrong: Some(margin.p_wrong()),
-                even: Some(margin.even),
-                chance: Some(margin.chance),
-                unexplained: Some(margin.unexplained),
-                places: Some(margin.places),
+                even: Some(margin.indistinct),
+                chance: Some(margin.indistinct_sigma),
+                unexplained: Some(margin.outliers),
+                places: Some(margin.alternatives),
                 scale: calibration
                     .scale
                     .map(|s| (rounded(s.scale), rounded(s.sigma))),
@@ -257,7 +260,7 @@ mod tests {
             target_from_source: off,
             covariance: Matrix6::from_diagonal(&Vector6::from([1e-4; 6])),
             margin: Margin {
-                log: f64::INFINITY,
+                log_ratio: f64::INFINITY,
                 ..Margin::default()
             },
             ..Calibration::refused(Verdict::Ok, "")

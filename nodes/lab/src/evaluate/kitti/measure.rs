@@ -185,7 +185,7 @@ impl Pair {
                 PairRow {
                     register_ms: 1e3 * spent.cpu_s,
                     verdict: Some(found.verdict.name().to_owned()),
-                    margin: Some(rounded(found.margin.log)).filter(|m| m.is_finite()),
+                    margin: Some(rounded(found.margin.log_ratio)).filter(|m| m.is_finite()),
                     ..row(&found.target_from_source, target.map_ms)
                 }
             }
