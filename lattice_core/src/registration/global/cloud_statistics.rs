@@ -1,4 +1,4 @@
-//! Range, density and noise of clouds, by which the sensor that made them is told.
+//! Range, density and noise of clouds, which identify the kind of sensor.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use rustc_hash::FxHashMap;
@@ -6,26 +6,25 @@ use rustc_hash::FxHashMap;
 use super::super::likelihood::quantile;
 use super::request::SourceCloud;
 
-/// Points that are looked at, at most; of more, some.
+/// Maximum number of sampled points.
 const POINTS: usize = 200_000;
-/// Side of the cells that points are counted in, metres.
+/// Side of the counting cells, metres.
 const CELL_M: f64 = 0.1;
-/// Fewest points of a cell that a plane is fitted to.
-const LEAST: f64 = 12.0;
-/// Share of the cells that are within the range.
+/// Minimum number of points in a cell for a plane fit.
+const MIN_PLANE_POINTS: f64 = 12.0;
+/// Quantile of the cell distances that defines the range.
 const WITHIN: f64 = 0.9;
-/// Farthest that a point may be, metres.
+/// Maximum coordinate of a point, metres.
 const FARTHEST_M: f64 = 1e6;
 
 /// Range, density and noise of clouds.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(super) struct CloudStatistics {
-    /// Distance from the sensor, or from the midst of the points, within which nine of ten surfaces are, metres.
+    /// Distance from the sensor, or from the centroid, that contains 90 % of the surfaces, metres.
     pub range_m: f64,
-    /// Points of a cell of 10 cm, in the median.
+    /// Median number of points per cell of 10 cm.
     pub points_of_cell: f64,
-    /// Distance of points from the plane through those of their cell, root mean square, metres, in the median; 0 if
-    /// there are too few.
+    /// Median RMS distance of points from the plane of their cell, metres; 0 if there are too few points.
     pub noise_m: f64,
 }
 
@@ -38,7 +37,7 @@ struct Cell {
 }
 
 impl CloudStatistics {
-    /// Of clouds, each seen from its own sensor.
+    /// Computes the statistics of clouds, each seen from its own sensor.
     pub fn of(scans: &[SourceCloud]) -> CloudStatistics {
         let all: usize = scans.iter().map(|scan| scan.cloud.len()).sum();
         let stride = all.div_ceil(POINTS).max(1);
@@ -58,6 +57,7 @@ impl CloudStatistics {
     }
 }
 
+/// Sampled points of a cloud, summed by cell.
 fn cells(scan: &SourceCloud, stride: usize) -> Vec<Cell> {
     let usable = |p: &&Point3<f64>| p.iter().all(|c| c.abs() <= FARTHEST_M);
     let points = || scan.cloud.points_m.iter().step_by(stride).filter(usable);
@@ -71,7 +71,7 @@ fn cells(scan: &SourceCloud, stride: usize) -> Vec<Cell> {
             distance_m: nalgebra::distance(point, &from),
             ..Cell::default()
         });
-        // From a corner of the cell: squares of large coordinates lose their digits.
+        // Coordinates relative to the cell's corner: squares of large coordinates lose digits.
         let place = point.coords - Vector3::from(key.map(|c| f64::from(c) * CELL_M));
         cell.points += 1.0;
         cell.sum_m += place;
@@ -81,8 +81,9 @@ fn cells(scan: &SourceCloud, stride: usize) -> Vec<Cell> {
 }
 
 impl Cell {
+    /// RMS distance of the points from their plane; `None` if there are too few.
     fn noise_m(&self) -> Option<f64> {
-        if self.points < LEAST {
+        if self.points < MIN_PLANE_POINTS {
             return None;
         }
         let centroid = self.sum_m / self.points;

@@ -10,39 +10,39 @@ use super::covariance::{ErrorModel, KERNEL};
 use super::request::{CalibrationRequest, SourceCloud};
 use crate::pose::se3;
 
-/// Steps of Gauss and Newton, with new partners before each.
+/// Maximum number of Gauss-Newton iterations, with new correspondences in each.
 const STEPS: usize = 10;
-/// Change of the scale below which a step is none.
-const STILL: f64 = 1e-4;
-/// Calibrations that a scale may take.
+/// Change of the scale at which the iteration has converged.
+const CONVERGED: f64 = 1e-4;
+/// Maximum number of registrations to find the scale.
 const ROUNDS: usize = 3;
-/// Difference from 1 that is not worth another calibration.
-const LEAST: f64 = 0.003;
-/// Standard deviation of a scale that was only tried.
-const ROUGHLY: f64 = 0.03;
-/// Log-likelihood that a scale gains which matters, whatever its standard deviation.
+/// Difference of the scale from 1 below which no further registration follows.
+const NEGLIGIBLE: f64 = 0.003;
+/// Standard deviation of a scale from the tested hypotheses.
+const TESTED_SIGMA: f64 = 0.03;
+/// Log-likelihood gain from which a scale is significant, whatever its standard deviation.
 const CLEAR_GAIN: f64 = 40.0;
-/// Scales that are believed to be of one world.
-const SANE: std::ops::Range<f64> = 0.5..2.0;
+/// Range of plausible scales.
+const PLAUSIBLE: std::ops::Range<f64> = 0.5..2.0;
 
-/// Pose and scale, and what equations at both by region.
+/// Normal equations of pose and scale (7 unknowns), with the gradient of each region.
 #[derive(Default)]
 struct NormalEquations7 {
     hessian: OMatrix<f64, U7, U7>,
     regions: BTreeMap<[i64; 3], (SVector<f64, 7>, SMatrix<f64, 7, 3>)>,
 }
 
-/// Pose and scale that fit best together.
+/// Jointly estimated pose and scale.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct ScaledPose {
-    /// Pose of points that keep their distance from the centre of the model, but for the scale.
+    /// Pose of the unscaled points; the scale applies about the centre of the error model.
     pub target_from_source: Isometry3<f64>,
     pub scale: f64,
-    /// Standard deviation that regions which err together give the scale.
+    /// Standard deviation of the scale, with correlated errors within regions.
     pub sigma: f64,
 }
 
-/// The scale that fits best near a pose; None if the points do not hold it.
+/// Estimates pose and scale near a pose; `None` if the points do not determine the scale.
 pub(super) fn scale_at(
     source: &PreparedCloud,
     target: &PreparedCloud,
@@ -62,7 +62,7 @@ pub(super) fn scale_at(
         let step = -(inverse * gradient);
         let moved = step.fixed_rows::<6>(0).into_owned();
         (pose, scale) = (pose * se3::exp(&moved), scale + step[6]);
-        if !SANE.contains(&scale) {
+        if !PLAUSIBLE.contains(&scale) {
             return None;
         }
         let lever = inverse.row(6);
@@ -71,23 +71,23 @@ pub(super) fn scale_at(
             (lever * residual).norm_squared() + model.sigma_m.powi(2) * moved
         };
         let variance: f64 = equations.regions.values().map(variance).sum();
-        // What a step still moves is not known.
+        // The last step bounds the convergence error.
         let sigma = variance.sqrt().hypot(step[6]);
         last = sigma.is_finite().then_some(ScaledPose {
             target_from_source: pose,
             scale,
             sigma,
         });
-        if step[6].abs() < STILL {
+        if step[6].abs() < CONVERGED {
             break;
         }
     }
     last
 }
 
-/// Calibrates with the points multiplied by their scale, until that is 1.
+/// Repeats a registration with the points multiplied by their estimated scale, until that is 1.
 ///
-/// `found` is the answer without; the scale of the answer is that of the points as they came.
+/// `found` is the result without scaling. The scale of the result refers to the unscaled points.
 pub(super) fn register_scaled(
     request: &CalibrationRequest<'_>,
     mut found: Calibration,
@@ -119,6 +119,7 @@ pub(super) fn register_scaled(
     found
 }
 
+/// Multiplies the coordinates of a cloud.
 fn scaled(scan: &SourceCloud, by: f64) -> SourceCloud {
     let mut scan = scan.clone();
     let points = scan.cloud.points_m.iter_mut().chain(&mut scan.sensor_m);
@@ -127,23 +128,24 @@ fn scaled(scan: &SourceCloud, by: f64) -> SourceCloud {
 }
 
 impl ScaleEstimate {
-    /// Of a scale that is known only to be about right.
+    /// Estimate of a scale from the tested hypotheses.
     pub(super) fn about(scale: f64) -> ScaleEstimate {
         ScaleEstimate {
             scale,
-            sigma: ROUGHLY,
+            sigma: TESTED_SIGMA,
             gain: 0.0,
         }
     }
 
-    /// True if it is neither 1 nor next to it.
+    /// Tests whether the scale differs significantly from 1.
     fn matters(&self) -> bool {
         let off = (self.scale - 1.0).abs();
-        off > LEAST && (off > 2.0 * self.sigma || self.gain > CLEAR_GAIN)
+        off > NEGLIGIBLE && (off > 2.0 * self.sigma || self.gain > CLEAR_GAIN)
     }
 }
 
 impl NormalEquations7 {
+    /// Accumulates the equations at a pose and a scale.
     fn at(
         source: &PreparedCloud,
         target: &PreparedCloud,
@@ -167,20 +169,20 @@ impl NormalEquations7 {
     }
 }
 
-/// A source point and its partner, linearised at a pose and a scale.
+/// Correspondence, linearized at a pose and a scale.
 struct Term {
     point: Point3<f64>,
-    /// Partner minus the point's place.
+    /// Target point minus the transformed source point.
     residual: Vector3<f64>,
-    /// Derivative of that by a motion and a turn on the right of the pose.
+    /// Derivative of the residual by a right perturbation of the pose (rho, phi).
     jacobian: Matrix3x6<f64>,
-    /// The opposite of its derivative by the scale.
+    /// Negative derivative of the residual by the scale.
     stretch: Vector3<f64>,
-    /// Inverse covariance, times what the kernel leaves of it.
+    /// Inverse covariance times the weight of the robust kernel.
     weight: Matrix3<f64>,
 }
 
-/// The points of a source that have a partner near their place.
+/// Correspondences of the source points within the gate.
 fn terms<'a>(
     source: &'a PreparedCloud,
     target: &'a PreparedCloud,
@@ -210,7 +212,7 @@ fn terms<'a>(
     })
 }
 
-/// Jacobian of q - T p by a motion and a turn on the right of T.
+/// Jacobian of q - T p by a right perturbation of T (rho, phi).
 fn jacobian(turn: &Matrix3<f64>, point: &Point3<f64>) -> Matrix3x6<f64> {
     let mut jacobian = Matrix3x6::zeros();
     jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&-turn);

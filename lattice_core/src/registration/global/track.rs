@@ -1,4 +1,4 @@
-//! Following a headset that is already calibrated.
+//! Tracking of a known pose by further clouds.
 
 use nalgebra::Isometry3;
 
@@ -8,27 +8,26 @@ use super::request::{CalibrationOptions, CalibrationRequest, SourceCloud};
 use super::source::PreparedSource;
 use super::verdict::is_constrained;
 
-/// Log-likelihood by which a refined pose must be better to replace the old one.
-const BETTER: f64 = 2.0;
+/// Log-likelihood ratio above which a refined pose replaces the known one.
+const REPLACE_LEAD: f64 = 2.0;
 
-/// Verdict of a further scan on a pose.
+/// Result of tracking a pose with one cloud.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct TrackUpdate {
-    /// True if the scan fits; a full search is due when several in a row do not.
+    /// True if the inlier fraction reaches its limit; after several failures in a row, a global registration is due.
     pub fits: bool,
-    /// `target_from_source` after the look; as before if it does not fit.
+    /// Updated `target_from_source`; unchanged if the cloud does not fit.
     pub target_from_source: Isometry3<f64>,
-    /// Share of the points on a surface of the map.
+    /// Fraction of inliers.
     pub inlier_fraction: f64,
-    /// Root mean square distance of those from the surfaces, metres.
+    /// RMS distance of the inliers from the surfaces, metres.
     pub rmse_m: f64,
 }
 
-/// Refines a known pose by one more look, cheaply: nothing is searched.
+/// Refines a known pose with one more cloud, without a search.
 ///
-/// A look that does not hold the pose in all directions, as one at a wall alone, tells no more than whether it fits:
-/// otherwise one after the other would drag the pose along what they do not see.
-/// A look that cannot be used fits as little as one from elsewhere.
+/// A cloud that does not constrain the pose in all directions, such as a single wall, updates only the fit:
+/// successive updates would drift along the weak directions. An unusable cloud counts as one that does not fit.
 pub fn track(
     map: &CalibrationMap,
     source_cloud: &SourceCloud,
@@ -52,7 +51,7 @@ pub fn track(
     let old = context.evaluate(&context.fit, *target_from_source, "tracking");
     let pose = context.refine_wide_gate(target_from_source);
     let new = context.evaluate(&context.fit, pose, "tracking");
-    let is_better = new.total() > old.total() + BETTER;
+    let is_better = new.total() > old.total() + REPLACE_LEAD;
     let best = match is_better && is_constrained(&context, &new) {
         true => new,
         false => old,

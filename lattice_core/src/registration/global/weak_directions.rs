@@ -1,4 +1,4 @@
-//! Directions that surfaces leave weak, measured by moving the pose along them.
+//! Weak directions of a pose: optimization of the pose and its variance along them by the likelihood.
 
 use nalgebra::{Isometry3, Point3, RowVector6, Vector6};
 use rayon::prelude::*;
@@ -10,23 +10,25 @@ use super::margin::SOFTNESS;
 use super::verdict::covariance;
 use crate::pose::se3;
 
-/// Standard deviation beyond which a direction is weak, as a share of the largest that is accepted.
+/// Standard deviation above which a direction is weak, as a fraction of its limit.
 const WEAK: f64 = 0.25;
-/// Weak directions that are measured, at most.
+/// Maximum number of weak directions.
 const MEASURED: usize = 3;
-/// Part of a spacing that what is seen moves by in a turn: surfaces hold turns far better than motions.
-const TURN: f64 = 0.25;
-/// Steps by which what is seen is moved to measure a direction, at most.
-const REACH: u32 = 8;
-/// Odds of a step over none, at most.
-const LIKELIEST: f64 = 1e6;
-/// Steps by which it is moved to climb, at first and once more.
-const FAR: [f64; 5] = [8.0, 4.0, 2.0, 1.0, 0.5];
-const NEAR: [f64; 3] = [2.0, 1.0, 0.5];
+/// Displacement of the points in a rotation step, in spacings; surfaces constrain rotations better than translations.
+const ROTATION_STEP: f64 = 0.25;
+/// Number of steps to each side in the estimate of a variance.
+const STEPS: u32 = 8;
+/// Maximum odds of a step over none.
+const MAX_ODDS: f64 = 1e6;
+/// Step sizes of the line search, first pass.
+const LARGE_STEPS: [f64; 5] = [8.0, 4.0, 2.0, 1.0, 0.5];
+/// Step sizes of the line search, second pass.
+const SMALL_STEPS: [f64; 3] = [2.0, 1.0, 0.5];
 
 impl RegistrationContext<'_> {
-    /// The covariance of a candidate's pose with what its likelihood says of the directions that surfaces and gravity
-    /// leave weak: the ends of a wall and its labels hold a pose along the wall.
+    /// Reduces the variance along weak directions to that of the likelihood.
+    ///
+    /// The ends of a wall and its labels constrain a pose along the wall, which its surface alone does not.
     pub fn with_probed_variances(
         &self,
         candidate: &Candidate,
@@ -42,18 +44,18 @@ impl RegistrationContext<'_> {
         })
     }
 
-    /// A candidate moved to where it is most likely along the directions that surfaces and gravity leave weak, in which
-    /// registration goes astray.
+    /// Moves a candidate to the maximum of the likelihood along its weak directions, where registration drifts.
     pub fn optimize_weak_directions(&self, candidate: Candidate) -> Candidate {
         let begin = candidate.total();
-        let far = self.optimize_by(candidate, &FAR);
+        let far = self.optimize_by(candidate, &LARGE_STEPS);
         match far.total() > begin {
-            // Other directions are weak there.
-            true => self.optimize_by(far, &NEAR),
+            // Other directions may be weak at the new pose.
+            true => self.optimize_by(far, &SMALL_STEPS),
             false => far,
         }
     }
 
+    /// Line search along each weak direction with the given step sizes.
     fn optimize_by(&self, candidate: Candidate, steps: &[f64]) -> Candidate {
         let Some(surfaces) = covariance(self, &candidate) else {
             return candidate;
@@ -65,14 +67,14 @@ impl RegistrationContext<'_> {
         })
     }
 
-    /// The most likely of a candidate and those a step to both sides.
+    /// The most likely of a candidate and its two neighbours at a step.
     fn best_of_steps(&self, candidate: Candidate, along: &Direction, step: f64) -> Candidate {
         let sides = [step, -step].map(|step| self.moved(&candidate, along, step));
         let likelier = |a: Candidate, b: Candidate| if b.total() > a.total() { b } else { a };
         sides.into_iter().fold(candidate, likelier)
     }
 
-    /// The directions that surfaces and gravity leave weak, the weakest first of each kind.
+    /// Weak directions given surfaces and gravity, the weakest first of each kind.
     fn weak(
         &self,
         candidate: &Candidate,
@@ -93,10 +95,10 @@ impl RegistrationContext<'_> {
         self.evaluate(&self.fit, moved, candidate.method)
     }
 
-    /// Variance of a direction about a pose, by the likelihoods of poses along it.
+    /// Variance along a direction about a pose, from the likelihoods of poses along it.
     fn variance(&self, candidate: &Candidate, kind: DirectionKind, along: &Direction) -> f64 {
         let unit = self.unit(kind);
-        let sides = (1..=REACH).flat_map(|i| [f64::from(i), -f64::from(i)]);
+        let sides = (1..=STEPS).flat_map(|i| [f64::from(i), -f64::from(i)]);
         let steps: Vec<f64> = sides.map(|step| step * unit).collect();
         let steps = steps.par_iter().map(|step| {
             let drop = candidate.total() - self.moved(candidate, along, *step).total();
@@ -105,15 +107,16 @@ impl RegistrationContext<'_> {
         variance(unit, &steps.collect::<Vec<_>>())
     }
 
-    /// Step along a direction: a spacing of the map, or a turn by which what is seen moves by a part of that.
+    /// Step along a direction: one spacing of the map, or the rotation that moves the points by [`ROTATION_STEP`] of
+    /// it.
     fn unit(&self, kind: DirectionKind) -> f64 {
         match kind {
             DirectionKind::Translation => self.map.spacing_m,
-            DirectionKind::Rotation => TURN * self.map.spacing_m / self.reach_m(),
+            DirectionKind::Rotation => ROTATION_STEP * self.map.spacing_m / self.reach_m(),
         }
     }
 
-    /// Root mean square distance of the headset's points from their midst, metres.
+    /// RMS distance of the source points from their centroid, metres.
     pub fn reach_m(&self) -> f64 {
         let (centroid, points): (Point3<f64>, _) = (self.centroid(), self.source.coarse.points_m());
         let sum: f64 = points.iter().map(|p| (p - centroid).norm_squared()).sum();
@@ -123,15 +126,15 @@ impl RegistrationContext<'_> {
     }
 }
 
-/// Second moment about 0 of a direction, given how much less likely steps along it are than none, in logarithms of odds.
+/// Second moment about 0 along a direction, given the steps and their decrease of the log-odds.
 fn variance(unit: f64, steps: &[(f64, f64)]) -> f64 {
     let (mut all, mut moment) = (1.0, 0.0);
     let mut narrow = 0.0_f64;
     for (step, drop) in steps {
-        let likely = (-drop).exp().min(LIKELIEST);
+        let likely = (-drop).exp().min(MAX_ODDS);
         all += likely;
         moment += likely * step * step;
-        // A peak that lies between two steps is that of a normal distribution.
+        // A peak between two steps is approximated by a normal distribution.
         if step.abs() < 1.5 * unit {
             let peak = 0.5 * step * step / drop.max(f64::MIN_POSITIVE);
             narrow = narrow.max(peak.min(step * step));
@@ -140,12 +143,12 @@ fn variance(unit: f64, steps: &[(f64, f64)]) -> f64 {
     (moment / all).max(narrow)
 }
 
-/// A direction of the place of a source point, or of the orientation.
+/// Direction of a translation of the centroid or of a rotation.
 #[derive(Clone, Copy, Debug)]
 struct Direction {
-    /// Derivative of the place or the angle along it by a motion and a turn on the right of the pose.
+    /// Derivative of the translation or the angle along it by a right perturbation of the pose (rho, phi).
     lever: RowVector6<f64>,
-    /// Motion and turn that move the pose by a unit along it, and along all else as far as both go together.
+    /// Perturbation that moves the pose by one unit along it; correlated directions move too.
     motion: Vector6<f64>,
 }
 
@@ -176,8 +179,7 @@ impl Direction {
 }
 
 impl PoseCovariance {
-    /// With a measurement of how far the pose is off along a direction of the place of a source point or of the
-    /// orientation: its variance.
+    /// Kalman update with a measurement of variance `variance` along a direction.
     fn measured(&self, direction: &Direction, variance: f64) -> PoseCovariance {
         let along = self.at_source * direction.lever.transpose();
         let spread = (direction.lever * along)[0] + variance;
@@ -218,7 +220,7 @@ mod tests {
     fn a_peak_has_the_variance_of_a_normal_distribution_and_a_valley_beside_it_widens_it() {
         let unit = 0.05;
         let steps = |drop: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
-            let sides = (1..=REACH).flat_map(|i| [f64::from(i), -f64::from(i)]);
+            let sides = (1..=STEPS).flat_map(|i| [f64::from(i), -f64::from(i)]);
             sides.map(|i| (i * unit, drop(i * unit))).collect()
         };
         for sigma in [0.01, 0.03, 0.05, 0.1] {
