@@ -62,7 +62,7 @@ pub(super) struct ErrorModel {
     pub gate_m: f64,
 }
 
-/// RegionGradient of the points of a region on the pose.
+/// Gradient of a region and its derivatives by the errors of the region.
 #[derive(Clone, Copy, Default)]
 struct RegionGradient {
     residual: Vector6<f64>,
@@ -384,7 +384,7 @@ mod tests {
         assert!((upright.rotation * Vector3::z()).xy().norm() < 1e-3);
         assert!((upright.rotation.euler_angles().2 - 1.2).abs() < 2e-3);
         assert!(covariance.at_source[(3, 3)] < 1e-6 && covariance.at_source[(5, 5)] > 9e-4);
-        // Held by its surfaces it stays where it is; a lean that nothing explains is left alone.
+        // Held by its surfaces it stays where it is; an unexplained tilt is left.
         let held = PoseCovariance {
             at_source: Matrix6::identity() * 1e-8,
         };

@@ -63,11 +63,15 @@ pub(super) fn select_and_classify(
             .filter(|c| c.is_near(&pose, &centroid, shift_m, turn_rad));
         near.fold(
             context.with_probed_variances(best, surfaces),
-            |sure, alternative| {
+            |covariance, alternative| {
                 let odds = ((alternative.total() - best.total()) / SOFTNESS)
                     .exp()
                     .min(1.0);
-                sure.with_alternative(&pose, &alternative.target_from_source, odds / (1.0 + odds))
+                covariance.with_alternative(
+                    &pose,
+                    &alternative.target_from_source,
+                    odds / (1.0 + odds),
+                )
             },
         )
     });
@@ -79,11 +83,13 @@ pub(super) fn select_and_classify(
         .map(|covariance| covariance.upright(&pose, gravity));
     let is_tilted = upright == Some(None);
     let (pose, covariance) = match upright.flatten() {
-        Some((pose, sure)) if !is_from_start => (pose, Some(sure)),
+        Some((pose, covariance)) if !is_from_start => (pose, Some(covariance)),
         _ => (pose, covariance),
     };
     let options = context.options;
-    let weak = covariance.as_ref().map(|sure| weak(context, sure, &pose));
+    let weak = covariance
+        .as_ref()
+        .map(|covariance| weak(context, covariance, &pose));
     let weak = weak.unwrap_or_default();
     let is_constrained = covariance.is_some();
     let (mut verdict, mut reason) = classify(options, best, &margin, &fit, is_constrained, &weak);
@@ -157,9 +163,10 @@ fn margin(
 /// Tests whether the surfaces constrain a pose in all directions, as the verdict `OK` requires.
 pub(super) fn is_constrained(context: &RegistrationContext<'_>, candidate: &Candidate) -> bool {
     let pose = &candidate.target_from_source;
-    let sure = covariance(context, candidate);
-    let sure = sure.and_then(|sure| sure.with_gravity(pose, context.options.gravity_sigma_rad));
-    sure.is_some_and(|sure| weak(context, &sure, pose).is_empty())
+    let covariance = covariance(context, candidate);
+    let covariance = covariance
+        .and_then(|covariance| covariance.with_gravity(pose, context.options.gravity_sigma_rad));
+    covariance.is_some_and(|covariance| weak(context, &covariance, pose).is_empty())
 }
 
 /// Directions whose standard deviation exceeds its limit.
