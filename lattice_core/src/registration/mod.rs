@@ -1,5 +1,5 @@
-//! Registration of labelled point clouds: Semantic-ICP (Parkison et al.; Nakamura et al.) and what it
-//! is measured against.
+//! Registration of labelled point clouds: Semantic-ICP (Parkison et al.; Nakamura et al.), its baselines and a global
+//! registration.
 
 mod cloud;
 mod confusion;

@@ -40,7 +40,7 @@ const COARSE_CELLS: f64 = 200_000.0;
 /// Region of poses that the search covers.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Region {
-    /// Pose in the center, `target_from_source`.
+    /// Central pose, `target_from_source`.
     pub about: Isometry3<f64>,
     /// Largest distance of the reference point from its central position, metres.
     pub radius_m: f64,
