@@ -4,10 +4,12 @@ use nalgebra::{Isometry3, Matrix3, Matrix3x6, OMatrix, Point3, SMatrix, SVector,
 use std::collections::BTreeMap;
 
 use super::super::PreparedCloud;
-use super::super::likelihood::region_of;
+use super::super::likelihood::{Partners, region_of};
 use super::calibration::{Calibration, ScaleEstimate};
+use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::{ErrorModel, KERNEL};
-use super::request::{CalibrationRequest, SourceCloud};
+use super::request::{CalibrationOptions, CalibrationRequest, SourceCloud};
+use super::verdict::error_model;
 use crate::pose::se3;
 
 /// Maximum number of Gauss-Newton iterations, with new correspondences in each.
@@ -24,6 +26,16 @@ const TESTED_SIGMA: f64 = 0.03;
 const CLEAR_GAIN: f64 = 40.0;
 /// Range of plausible scales.
 const PLAUSIBLE: std::ops::Range<f64> = 0.5..2.0;
+
+/// Log-likelihood gain above which another scale is accepted.
+const SCALE_GAIN: f64 = 40.0;
+/// The same per observation: correct poses on warped meshes gain less than 0.1, clouds with a scale error of 5 % at
+/// least 1.
+const SCALE_GAIN_PER_OBSERVATION: f64 = 0.3;
+/// Largest loss of the inlier fraction at another scale.
+const MAX_INLIER_LOSS: f64 = 0.02;
+/// RMS distance from surfaces below which differences do not count, metres.
+const MIN_RMSE_M: f64 = 1e-3;
 
 /// Normal equations of pose and scale (7 unknowns), with the gradient of each region.
 #[derive(Default)]
@@ -83,6 +95,52 @@ pub(super) fn scale_at(
         }
     }
     last
+}
+
+/// Scale estimated with the pose of a candidate.
+pub(super) fn estimate_scale(
+    context: &RegistrationContext<'_>,
+    best: &Candidate,
+) -> Option<ScaleEstimate> {
+    let (source, target) = (&context.source.full, &context.map.cloud);
+    let model = error_model(context, best);
+    let found = scale_at(source, target, &best.target_from_source, &model)?;
+    let (pose, scale) = (&found.target_from_source, found.scale);
+    let partners = context.fit.partners_scaled(pose, &model.center, scale);
+    Some(ScaleEstimate {
+        scale,
+        sigma: found.sigma,
+        gain: gain(context.fit.observations(), best, &partners),
+    })
+}
+
+/// Log-likelihood gained by another scale, for normally distributed residuals; 0 if points lose their
+/// correspondences.
+fn gain(observations: f64, best: &Candidate, scaled: &Partners) -> f64 {
+    if scaled.inlier_fraction < best.inlier_fraction - MAX_INLIER_LOSS {
+        return 0.0;
+    }
+    let both = scaled.inlier_fraction.min(best.inlier_fraction);
+    let closer = (best.rmse_m.max(MIN_RMSE_M) / scaled.rmse_m.max(MIN_RMSE_M)).ln();
+    both * observations * closer
+}
+
+/// Reason to reject points whose scale differs from that of the map.
+pub(super) fn scale_fault(
+    scale: Option<ScaleEstimate>,
+    observations: f64,
+    options: &CalibrationOptions,
+) -> Option<String> {
+    let ScaleEstimate { scale, sigma, gain } = scale.filter(|_| !options.estimate_scale)?;
+    let off = (scale - 1.0).abs() > options.max_scale_error;
+    let is_certain = gain > SCALE_GAIN.max(SCALE_GAIN_PER_OBSERVATION * observations);
+    (off && is_certain).then(|| {
+        let most = 100.0 * options.max_scale_error;
+        format!(
+            "the cloud fits with its points multiplied by {scale:.3}, standard deviation {sigma:.3}: the scale error \
+             exceeds {most:.0} % (`max_scale_error`), check its unit"
+        )
+    })
 }
 
 /// Repeats a registration with the points multiplied by their estimated scale, until that is 1.
@@ -219,4 +277,30 @@ fn jacobian(turn: &Matrix3<f64>, point: &Point3<f64>) -> Matrix3x6<f64> {
     let lever = turn * point.coords.cross_matrix();
     jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
     jacobian
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scale_is_wrong_that_is_beyond_its_bound_and_fits_far_better() {
+        let given = CalibrationOptions::default();
+        let is_wrong = |scale, gain, options: &CalibrationOptions| {
+            let estimate = ScaleEstimate {
+                scale,
+                sigma: 0.02,
+                gain,
+            };
+            scale_fault(Some(estimate), 500.0, options).is_some()
+        };
+        assert!(is_wrong(1.053, 300.0, &given) && is_wrong(0.9, 300.0, &given));
+        // A bump of a warped mesh is explained a little better by a scale.
+        assert!(!is_wrong(1.053, 100.0, &given) && !is_wrong(1.02, 300.0, &given));
+        let estimated = CalibrationOptions {
+            estimate_scale: true,
+            ..given
+        };
+        assert!(!is_wrong(0.9, 300.0, &estimated));
+    }
 }

@@ -2,17 +2,14 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector3};
 
-use super::super::likelihood::Partners;
-use super::calibration::{
-    Calibration, ClassReliability, DirectionKind, ScaleEstimate, Verdict, WeakDirection,
-};
+use super::calibration::{Calibration, ClassReliability, DirectionKind, Verdict, WeakDirection};
 use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::{ErrorModel, PoseCovariance};
 use super::fit_diagnostics::{FitDiagnostics, fit_diagnostics};
 use super::margin::{Margin, SOFTNESS, describe_p_wrong};
 use super::most_likely;
 use super::request::CalibrationOptions;
-use super::scale::scale_at;
+use super::scale::{estimate_scale, scale_fault};
 
 /// Penalty weight: a line of sight that the map contradicts counts as three outliers.
 const CONTRADICTION_PENALTY: f64 = 3.0;
@@ -28,15 +25,6 @@ const LARGE: f64 = 2.0;
 const REGIONS: f64 = 4.0;
 /// Tilt beyond which a pose is rejected, in standard deviations.
 const MAX_TILT_SIGMAS: f64 = 5.0;
-/// Log-likelihood gain above which another scale is accepted.
-const SCALE_GAIN: f64 = 40.0;
-/// The same per observation: correct poses on warped meshes gain less than 0.1, clouds with a scale error of 5 % at
-/// least 1.
-const SCALE_GAIN_PER_OBSERVATION: f64 = 0.3;
-/// Largest loss of the inlier fraction at another scale.
-const MAX_INLIER_LOSS: f64 = 0.02;
-/// RMS distance from surfaces below which differences do not count, metres.
-const MIN_RMSE_M: f64 = 1e-3;
 /// Log-likelihood ratio above which another pose replaces the result of GICP-SE(3) from the initial guess.
 const REPLACE_LEAD: f64 = 10.0;
 
@@ -93,7 +81,7 @@ pub(super) fn select_and_classify(
     let weak = weak.unwrap_or_default();
     let is_constrained = covariance.is_some();
     let (mut verdict, mut reason) = classify(options, best, &margin, &fit, is_constrained, &weak);
-    let scale = scale(context, best);
+    let scale = estimate_scale(context, best);
     if best.inlier_fraction >= options.min_inliers
         && let Some(fault) = tilt_fault(&pose, is_tilted, options)
             .or_else(|| scale_fault(scale, context.fit.observations(), options))
@@ -193,24 +181,6 @@ fn tilt_fault(
         let most = (MAX_TILT_SIGMAS * options.gravity_sigma_rad).to_degrees();
         format!(
             "the cloud leans by {degrees:.1} degrees in the map, above {most:.1} degrees: gravity must be along -z of both"
-        )
-    })
-}
-
-/// Reason to reject points whose scale differs from that of the map.
-fn scale_fault(
-    scale: Option<ScaleEstimate>,
-    observations: f64,
-    options: &CalibrationOptions,
-) -> Option<String> {
-    let ScaleEstimate { scale, sigma, gain } = scale.filter(|_| !options.estimate_scale)?;
-    let off = (scale - 1.0).abs() > options.max_scale_error;
-    let is_certain = gain > SCALE_GAIN.max(SCALE_GAIN_PER_OBSERVATION * observations);
-    (off && is_certain).then(|| {
-        let most = 100.0 * options.max_scale_error;
-        format!(
-            "the cloud fits with its points multiplied by {scale:.3}, standard deviation {sigma:.3}: the scale error \
-             exceeds {most:.0} % (`max_scale_error`), check its unit"
         )
     })
 }
@@ -320,33 +290,8 @@ pub(super) fn covariance(
     PoseCovariance::at(source, target, &best.target_from_source, &model)
 }
 
-/// Scale estimated with the pose of a candidate.
-fn scale(context: &RegistrationContext<'_>, best: &Candidate) -> Option<ScaleEstimate> {
-    let (source, target) = (&context.source.full, &context.map.cloud);
-    let model = error_model(context, best);
-    let found = scale_at(source, target, &best.target_from_source, &model)?;
-    let (pose, scale) = (&found.target_from_source, found.scale);
-    let partners = context.fit.partners_scaled(pose, &model.center, scale);
-    Some(ScaleEstimate {
-        scale,
-        sigma: found.sigma,
-        gain: gain(context.fit.observations(), best, &partners),
-    })
-}
-
-/// Log-likelihood gained by another scale, for normally distributed residuals; 0 if points lose their
-/// correspondences.
-fn gain(observations: f64, best: &Candidate, scaled: &Partners) -> f64 {
-    if scaled.inlier_fraction < best.inlier_fraction - MAX_INLIER_LOSS {
-        return 0.0;
-    }
-    let both = scaled.inlier_fraction.min(best.inlier_fraction);
-    let closer = (best.rmse_m.max(MIN_RMSE_M) / scaled.rmse_m.max(MIN_RMSE_M)).ln();
-    both * observations * closer
-}
-
 /// Error model of the source at a candidate's pose.
-fn error_model(context: &RegistrationContext<'_>, best: &Candidate) -> ErrorModel {
+pub(super) fn error_model(context: &RegistrationContext<'_>, best: &Candidate) -> ErrorModel {
     let options = context.options;
     let extent_m = EXTENT * context.reach_m();
     let is_small = extent_m < LARGE * options.region_m;
@@ -383,30 +328,4 @@ fn reliability(best: &Candidate) -> Vec<ClassReliability> {
         .map(of)
         .filter(|c| c.weight > 0.0)
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_scale_is_wrong_that_is_beyond_its_bound_and_fits_far_better() {
-        let given = CalibrationOptions::default();
-        let is_wrong = |scale, gain, options: &CalibrationOptions| {
-            let estimate = ScaleEstimate {
-                scale,
-                sigma: 0.02,
-                gain,
-            };
-            scale_fault(Some(estimate), 500.0, options).is_some()
-        };
-        assert!(is_wrong(1.053, 300.0, &given) && is_wrong(0.9, 300.0, &given));
-        // A bump of a warped mesh is explained a little better by a scale.
-        assert!(!is_wrong(1.053, 100.0, &given) && !is_wrong(1.02, 300.0, &given));
-        let estimated = CalibrationOptions {
-            estimate_scale: true,
-            ..given
-        };
-        assert!(!is_wrong(0.9, 300.0, &estimated));
-    }
 }

@@ -70,8 +70,8 @@ pub(super) struct Correspondence {
 }
 
 impl Correspondence {
-    /// Correspondence of a source point that the pose takes to `q`, and target point `y`; the pose takes the centre of the source
-    /// to `center`.
+    /// Correspondence of a source point, transformed to `q` with normal `m`, and a target point `y` with normal `n`;
+    /// `center` is the transformed centre of the source.
     #[inline(always)]
     pub fn new(
         metric: Metric,

@@ -1,4 +1,4 @@
-//! Correspondences of source and target points, found at one pose and measured at others.
+//! Correspondences of source and target points, found at one pose and evaluated at others.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
