@@ -13,7 +13,7 @@ pub(super) struct Shape {
     /// Generator in the lattice's own axes.
     pub(super) generator: Matrix3<f64>,
     pub(super) map_from_lattice: UnitQuaternion<f64>,
-    /// In the axes of the map.
+    /// Voronoi cell in the axes of the map.
     pub(super) cell: VoronoiCell,
     pub(super) covering_radius_m: f64,
     pub(super) packing_radius_m: f64,

@@ -9,8 +9,8 @@ mod global;
 mod labels;
 mod likelihood;
 mod named;
-mod options;
 mod prepared;
+mod register_options;
 mod search;
 mod solver;
 
@@ -27,6 +27,6 @@ pub use global::{
 };
 pub use labels::{LabelDistribution, UNLABELED};
 pub use named::NamedMethod;
-pub use options::{LabelUse, MAX_CANDIDATES, Method, RegisterOptions, SemanticVariant};
 pub use prepared::{MAX_COORDINATE_M, PrepareOptions, PreparedCloud};
+pub use register_options::{LabelUse, MAX_CANDIDATES, Method, RegisterOptions, SemanticVariant};
 pub use solver::{Registration, register};

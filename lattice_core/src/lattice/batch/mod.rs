@@ -23,9 +23,9 @@ const BLOCK_LINES: usize = BLOCK * size_of::<[f32; 3]>() / 64;
 
 /// Half of one unit in the last place of 1.
 const EPSILON: f64 = 1.0 / (1_u64 << 24) as f64;
-/// Maximum distance of a point from the phase's lattice point in the kernel, in cuboid sides,
+/// Maximum distance of a point from the phase's lattice point in the kernel, in cuboid sides.
 const KERNEL_REACH: f64 = (1 << 13) as f64;
-/// and the bound of its indices.
+/// Bound of the indices of the phase's lattice point.
 const BASE_LIMIT: u64 = 1 << 18;
 
 /// Quantizes batches of points that share a rigid transform to the lattice.
