@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// Number of steps per unit of log-odds.
+/// Step of log-odds.
 const UNIT: f64 = 1.0 / 32.0;
 
 /// Log-odds of an unknown cell.

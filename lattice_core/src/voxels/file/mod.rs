@@ -1,6 +1,6 @@
-//! Maps as files: lattice, datum, sorted keys and, if wanted, the payload of each voxel.
+//! Map files: lattice, datum, sorted keys and, optionally, the payload of each voxel.
 //!
-//! `docs/map_file.md` describes the format and has a reader in Python.
+//! `docs/map_file.md` specifies the format and has a reader in Python.
 
 mod column_values;
 mod columns;

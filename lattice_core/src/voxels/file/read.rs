@@ -1,4 +1,4 @@
-//! Reading a map: its sections in order, each column checked value by value.
+//! Reading a map: sections in order, each column validated value by value.
 
 use std::io::{self, Read};
 
@@ -17,13 +17,13 @@ use crate::voxels::store::fixed_point::reach;
 impl MapContents {
     /// Reads a map of at most `max_voxels`.
     ///
-    /// Columns with unknown names are skipped; otherwise this refuses anything that no writer of
-    /// this format writes. Allocates in proportion to the bytes that have been read.
+    /// Columns with unknown names are skipped; anything else that no writer of this format writes is rejected.
+    /// Allocates in proportion to the bytes read.
     pub fn read(reader: impl Read, max_voxels: usize) -> Result<MapContents, FileError> {
         Self::read_columns(reader, max_voxels, COLUMNS.len())
     }
 
-    /// As [`MapContents::read`], but skips everything behind the keys.
+    /// As [`MapContents::read`], but skips everything after the keys.
     pub(super) fn read_keys(
         reader: impl Read,
         max_voxels: usize,
@@ -31,7 +31,7 @@ impl MapContents {
         Self::read_columns(reader, max_voxels, 1)
     }
 
-    /// Reads the first `wanted` of the columns that are known.
+    /// Reads the first `wanted` of the known columns.
     fn read_columns(
         reader: impl Read,
         max_voxels: usize,
@@ -134,7 +134,7 @@ impl MapContents {
     }
 }
 
-/// Error in the values of a column, with the byte behind it.
+/// Error in the values of a column, at the byte after it.
 pub(super) struct ColumnError {
     offset: usize,
     reason: String,
@@ -142,7 +142,7 @@ pub(super) struct ColumnError {
 
 impl From<CodecError> for ColumnError {
     fn from(error: CodecError) -> ColumnError {
-        // The bytes have the right CRC: what is wrong was written so.
+        // The CRC matches, so the error was written.
         let (offset, reason) = match error {
             CodecError::Truncated { position } => (position, "it ends within a number".to_owned()),
             CodecError::Varint { position } => (
@@ -160,7 +160,7 @@ impl From<CodecError> for ColumnError {
 }
 
 impl Varints<'_> {
-    /// An error at the place of the next value.
+    /// Error at the position of the next value.
     pub(super) fn error(&self, reason: String) -> ColumnError {
         ColumnError {
             offset: self.position(),
