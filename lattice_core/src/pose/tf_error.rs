@@ -38,7 +38,7 @@ pub enum TfInsertError {
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum TfMiss {
     /// Unknown frame.
-    #[error("frame '{frame}' is not known: nobody published it on tf or tf_static")]
+    #[error("unknown frame '{frame}': no transform of it was received on tf or tf_static")]
     UnknownFrame { frame: String },
     /// Frames in two trees.
     #[error(

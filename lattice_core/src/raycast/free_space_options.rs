@@ -51,13 +51,13 @@ pub enum FreeSpaceError {
     #[error("free level: {0}")]
     Coarse(#[from] LatticeError),
     /// Range limit that is not positive.
-    #[error("max_range_m {0} is not above 0")]
+    #[error("max range {0} m is not above 0 (`max_range_m`)")]
     Range(f64),
     /// Free level out of range.
-    #[error("free_level {0} is above {MAX_FREE_LEVEL}")]
+    #[error("free level {0} is above {MAX_FREE_LEVEL} (`free_level`)")]
     FreeLevel(u32),
     /// Memory limit out of range.
-    #[error("max_bytes {0} is below {MIN_MAP_BYTES}")]
+    #[error("memory limit {0} bytes is below {MIN_MAP_BYTES} (`max_bytes`)")]
     Memory(usize),
 }
 

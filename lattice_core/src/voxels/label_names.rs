@@ -64,7 +64,7 @@ pub fn read_label_names(mut file: impl Read + Seek) -> Result<LabelNames, FileEr
         let corrupt = |reason: String| FileError::Corrupt { position, reason };
         let (summed, crc) = head.split_at(SECTION_HEAD_BYTES - 4);
         if !head.starts_with(SECTION_TAG) || crc32fast::hash(summed) != u32_at(crc, 0) {
-            return Err(corrupt("a section should begin here".to_owned()));
+            return Err(corrupt("expected the start of a section".to_owned()));
         }
         let stored = u64_at(&head, 32);
         if head.get(4..20) != Some(SECTION.as_slice()) {
@@ -201,7 +201,7 @@ impl<W: Write> Appended<W> {
 
     fn finish(mut self) -> io::Result<()> {
         if !self.held.starts_with(END_TAG) {
-            return Err(io::Error::other("the map has no end"));
+            return Err(io::Error::other("the map has no end marker"));
         }
         let mut end = std::mem::take(&mut self.section);
         end.extend(END_TAG);

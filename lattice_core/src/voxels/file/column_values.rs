@@ -83,12 +83,12 @@ pub(super) fn decode_labels(
 /// Next value; fails at the end.
 pub(super) fn expect(values: &mut Varints) -> Result<u64, ColumnError> {
     let value = values.next_value()?;
-    value.ok_or_else(|| values.error("it has too few values".into()))
+    value.ok_or_else(|| values.error("there are too few values".into()))
 }
 
 pub(super) fn expect_end(values: &mut Varints) -> Result<(), ColumnError> {
     match values.next_value()? {
-        Some(_) => Err(values.error("it has too many values".into())),
+        Some(_) => Err(values.error("there are too many values".into())),
         None => Ok(()),
     }
 }

@@ -97,7 +97,7 @@ impl MapColumns {
         let pairs = self.keys.iter().zip(self.keys.iter().skip(1));
         if let Some((key, next)) = pairs.clone().find(|(key, next)| key >= next) {
             let (key, next) = (key.raw(), next.raw());
-            return Err(format!("key {next} follows {key}: keys ascend"));
+            return Err(format!("key {next} follows {key}: keys must ascend"));
         }
         let reach = reach(&self.lattice);
         for (key, voxel) in self.keys.iter().zip(self.voxels.iter().flatten()) {
@@ -163,7 +163,7 @@ mod tests {
             ("20 keys and 19 rows of counts", |c| {
                 c.voxels.as_mut().unwrap().truncate(19);
             }),
-            ("keys ascend", |c| c.keys.swap(0, 1)),
+            ("keys must ascend", |c| c.keys.swap(0, 1)),
             ("a voxel without points", |c| {
                 c.voxels.as_mut().unwrap()[3].count = 0;
             }),

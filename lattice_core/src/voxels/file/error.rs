@@ -15,15 +15,15 @@ pub enum FileError {
     #[error("not a map file: it starts with {:?} instead of \"LATTICE2\"", found.escape_ascii().to_string())]
     Magic { found: [u8; 8] },
     /// Format 1, before 2026-11, without sections.
-    #[error("the map file has format 1, which is no longer read: make the map again from its log")]
+    #[error(
+        "the map file has format 1, which is not supported any more: create the map again from its log"
+    )]
     OldVersion,
     /// Truncated file.
     #[error("the map file is cut short: it ends at byte {position}, within the {part}")]
     Truncated { position: u64, part: String },
     /// More voxels than the caller allows.
-    #[error(
-        "the map file has {voxels} voxels, but at most {max_voxels} are allowed: raise max_voxels"
-    )]
+    #[error("the map file has {voxels} voxels, above the limit of {max_voxels}: raise max_voxels")]
     TooManyVoxels { voxels: u64, max_voxels: usize },
     /// More memory than the caller allows.
     #[error(
@@ -45,12 +45,12 @@ pub enum FileError {
         calculated: u32,
     },
     /// Data after the end marker.
-    #[error("the map ends at byte {position}, but the file goes on")]
+    #[error("data follow the end of the map at byte {position}")]
     TrailingBytes { position: u64 },
     /// Lattice that readers reject.
     #[error("the lattice cannot be written: {0}")]
     Lattice(String),
     /// zstd level that readers need not support.
-    #[error("zstd level {0} is not between 1 and 19")]
+    #[error("zstd level {0} is outside 1..=19")]
     Level(i32),
 }

@@ -178,7 +178,10 @@ impl SectionHead {
         let name = name_of(&fields.array::<16>()).map_err(|reason| corrupt(at, reason))?;
         let [encoding, components, codec, reserved] = fields.array();
         if reserved != 0 {
-            return Err(corrupt(fields.position - 1, "a byte should be zero".into()));
+            return Err(corrupt(
+                fields.position - 1,
+                "a reserved byte is not zero".into(),
+            ));
         }
         Ok(SectionHead {
             name,
@@ -214,7 +217,10 @@ fn name_of(bytes: &[u8; 16]) -> Result<String, String> {
         .collect();
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
     if name.is_empty() || !name.chars().all(plain) || name16(&name) != *bytes {
-        return Err(format!("{:?} is no name", bytes.escape_ascii().to_string()));
+        return Err(format!(
+            "{:?} is not a section name",
+            bytes.escape_ascii().to_string()
+        ));
     }
     Ok(name)
 }

@@ -98,7 +98,7 @@ impl LatticeFigures {
         if bits(&self.orientation) != bits(&expected.orientation) {
             let (turned, expected) = (self.orientation, expected.orientation);
             return Err(Figure::Orientation.error(format!(
-                "orientation {turned:?} should be written as {expected:?}"
+                "orientation {turned:?} differs from its canonical form {expected:?}"
             )));
         }
         if bits(generator) != bits(&expected.generator_m) {
@@ -117,7 +117,7 @@ pub(super) fn orientation_error(map_from_lattice: &UnitQuaternion<f64>) -> Optio
     let unit = (square - 1.0).abs() <= UNIT_SLACK;
     (!unit).then(|| {
         format!(
-            "the orientation {:?} is no unit quaternion",
+            "orientation {:?} is not a unit quaternion",
             map_from_lattice.coords
         )
     })

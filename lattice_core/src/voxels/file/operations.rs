@@ -15,7 +15,9 @@ use crate::voxels::{Voxel, set_ops};
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum OperationError {
     /// Different cells.
-    #[error("one map is of {ours}, the other of {theirs}: only maps of the same cells go together")]
+    #[error(
+        "one map is of {ours}, the other of {theirs}: only maps of the same lattice can be combined"
+    )]
     Lattice { ours: String, theirs: String },
     /// Cell of the other map out of the key range of the receiving one.
     #[error(

@@ -98,7 +98,7 @@ impl<R: Read> Source<R> {
         let mut tag = [0; 4];
         self.fill(&mut tag, "head of a section")?;
         if tag != *SECTION_TAG {
-            return Err(corrupt(start, "a section should begin here".to_owned()));
+            return Err(corrupt(start, "expected the start of a section".to_owned()));
         }
         let bytes = self.summed::<SECTION_HEAD_BYTES>(&tag, "head of a section")?;
         SectionHead::from_bytes(&bytes, start)
@@ -145,7 +145,7 @@ impl<R: Read> Source<R> {
         let mut tag = [0; 4];
         self.fill(&mut tag, "end marker")?;
         if tag != *END_TAG {
-            return Err(corrupt(start, "the end marker should be here".to_owned()));
+            return Err(corrupt(start, "expected the end marker".to_owned()));
         }
         self.crc.update(&tag);
         let end = self.position;

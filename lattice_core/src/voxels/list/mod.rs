@@ -250,7 +250,7 @@ impl VoxelList {
         let reach = reach(&self.lattice);
         if self.len() > self.max_voxels {
             return Err(format!(
-                "{} voxels, but at most {} allowed",
+                "{} voxels, above the limit of {}",
                 self.len(),
                 self.max_voxels
             ));

@@ -73,7 +73,7 @@ impl Recent {
                 code.unpack()
             )),
             None if self.slots.len() == SLOTS => Ok(()),
-            None => Err("the filter is gone".to_owned()),
+            None => Err("the filter of recent cells is missing".to_owned()),
         }
     }
 }
