@@ -11,7 +11,6 @@ mod files;
 mod house;
 mod initial_guess;
 pub mod kitti;
-mod looks;
 mod many;
 mod methods;
 mod odds;
@@ -28,6 +27,7 @@ mod testbed;
 mod town;
 mod traps;
 mod trial;
+mod views;
 
 pub use chain::{ChainOptions, chain_report, chain_settings, run_chain};
 pub use house::read_house;

@@ -7,11 +7,11 @@ use lattice_core::registration::{
 use nalgebra::{Isometry3, Point3};
 
 use super::Settings;
-use super::looks::{any_pose, keep_sector};
 use super::many::{Case, settings_of};
 use super::pairs::{columns, line, of_scenes, shared, trial};
 use super::settings::Cell;
 use super::trial::{Trial, WRONG};
+use super::views::{any_pose, keep_sector};
 use crate::AnyError;
 use crate::options::within;
 use crate::random::Stream;

@@ -1,6 +1,6 @@
 //! Traps: rooms that look alike from several places, and clouds that are not what they are said to be.
 
-use crate::evaluate::looks::{any_pose, keep_sector, signed};
+use crate::evaluate::views::{any_pose, keep_sector, signed};
 use crate::random::Stream;
 use crate::simulate::rooms::{Flat, LOOKS};
 use lattice_core::pose::Axes;

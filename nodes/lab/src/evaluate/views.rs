@@ -1,11 +1,11 @@
-//! Random poses of looks, and parts of them.
+//! Random poses of views, and sectors of them.
 
 use lattice_core::registration::SourceCloud;
 use nalgebra::{Isometry3, Vector3};
 
 use crate::random::Stream;
 
-/// A pose without a lean, a few metres off.
+/// Random upright pose within a few metres.
 pub fn any_pose(random: &mut Stream) -> Isometry3<f64> {
     let place = Vector3::new(3.0 * signed(random), 3.0 * signed(random), 1.5);
     Isometry3::new(place, Vector3::z() * std::f64::consts::PI * signed(random))
