@@ -5,6 +5,7 @@
 //! Results are lines of a file that grows and is continued; the report is made of all of them, failures
 //! included.
 
+mod calibration_regression;
 mod chain;
 mod figures;
 mod files;
@@ -13,7 +14,6 @@ mod initial_guess;
 pub mod kitti;
 mod many;
 mod methods;
-mod odds;
 mod pairs;
 mod reliability;
 mod report;

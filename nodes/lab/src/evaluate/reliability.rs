@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use plotters::prelude::*;
 
-use super::odds::OddsCurve;
+use super::calibration_regression::OddsCurve;
 use super::statistics::{Share, median};
 use super::trial::{Judged, OURS, Trial};
 use crate::AnyError;
