@@ -1,4 +1,4 @@
-//! Rooms that look alike from several places: the traps of a calibration without a guess.
+//! Rooms that look alike from several places: adversarial scenes of a registration without a guess.
 
 use lattice_core::registration::{LabelDistribution, SemanticCloud, SourceCloud};
 use nalgebra::{Isometry3, Point3, Vector3};
