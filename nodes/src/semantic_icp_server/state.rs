@@ -145,7 +145,7 @@ impl SemanticIcpServer {
         };
         out.push(Output::Job(Job {
             id: self.next_job,
-            unlearn: std::mem::take(&mut self.unlearn),
+            reset_labels: std::mem::take(&mut self.reset_labels),
             map: self.map_to_prepare(now_ns, map_age_ns),
             work,
             canceled: Arc::clone(&running.canceled),
