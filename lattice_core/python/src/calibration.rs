@@ -1,7 +1,7 @@
 //! `calibrate`.
 
 use lattice_core::registration::{
-    CalibrationMap, CalibrationRequest, SourceCloud, LabelDistribution, Profile, SemanticCloud,
+    CalibrationMap, CalibrationRequest, LabelDistribution, Profile, SemanticCloud, SourceCloud,
     register_global,
 };
 use nalgebra::Point3;
@@ -16,24 +16,24 @@ use crate::pose::{isometry_of, matrix_of, matrix6_of};
 use crate::registration::cloud_of;
 use crate::threads::{background, on_pool};
 
-/// Pose of a cloud in a map, and whether it can be trusted.
+/// Pose of a cloud in a map, with its verdict.
 #[pyclass(frozen, get_all, module = "lattice_core")]
 pub struct Calibration {
-    /// OK, AMBIGUOUS, DEGENERATE, NO_OVERLAP or REJECTED_INPUT; the pose is to be used only with OK.
+    /// OK, AMBIGUOUS, DEGENERATE, NO_OVERLAP or REJECTED_INPUT; use the pose only with OK.
     verdict: String,
     /// Reason for the verdict.
     reason: String,
-    /// Takes points of the cloud to the map, shape (4, 4).
+    /// Transform of points of the cloud to the map, shape (4, 4).
     map_from_cloud: Py<PyAny>,
-    /// Covariance of x, y, z (m^2) and the turns about x, y, z (rad^2) in the map, shape (6, 6).
+    /// Covariance of x, y, z (m^2) and of the rotations about x, y, z (rad^2) in the map, shape (6, 6).
     covariance: Py<PyAny>,
-    /// Probability that another pose is right.
+    /// Probability of error, p_wrong.
     p_wrong: f64,
-    /// Share of the points on a surface of the map.
+    /// Fraction of inliers.
     inlier_fraction: f64,
-    /// Root mean square distance of those from the surfaces, m.
+    /// RMS distance of the inliers from the surfaces, m.
     rmse_m: f64,
-    /// Method that made the winning pose.
+    /// Method that found the pose.
     method: String,
 }
 
@@ -71,7 +71,7 @@ impl Calibration {
     }
 }
 
-/// Finds where a cloud (points, m, gravity along -z) lies in a map, without a guess, and judges the answer.
+/// Registers a cloud (points, m, gravity along -z) in a map without an initial guess, with a verdict.
 #[pyfunction]
 #[pyo3(signature = (map, xyz, labels=None, *, sensor=None, start=None, profile="headset"))]
 pub fn calibrate(
