@@ -1,4 +1,4 @@
-//! A pure library without ROS, sockets or clocks.
+//! Pure library without ROS, sockets or clocks.
 #![deny(unsafe_code)]
 
 pub mod cloud;

@@ -22,7 +22,7 @@ const PART: usize = 1 << 14;
 /// Rows between two checks for signals, 0.1 s of one thread.
 const STEP: usize = 1 << 22;
 
-/// A lattice of cells of one volume: cubic, bcc, fcc, mcc, hex or hexopt.
+/// Lattice of cells of one volume: cubic, bcc, fcc, mcc, hex or hexopt.
 #[pyclass(frozen, module = "lattice_core")]
 pub struct Lattice {
     pub core: Core,

@@ -43,8 +43,8 @@ impl Precision {
     }
 }
 
-/// Layout of a record, little endian and without padding: `x y z`, the copied fields, and optionally `vp_x vp_y
-/// vp_z`.
+/// Layout of a record, little endian and without padding: `x y z`, the copied fields, and optionally
+/// `vp_x vp_y vp_z`.
 #[derive(Clone, Debug)]
 pub struct RecordFormat {
     /// Copied fields of the cloud.

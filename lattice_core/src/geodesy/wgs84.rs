@@ -1,4 +1,4 @@
-//! The WGS84 ellipsoid: geodetic coordinates to ECEF and back.
+//! WGS84 ellipsoid: geodetic coordinates to ECEF and back.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

@@ -9,8 +9,8 @@ const BLOCK_MASK: u64 = (1 << BLOCK_BITS) - 1;
 
 /// Cell as a block and a position in it; blocks have 8 x 8 x 8 lattice indices.
 ///
-/// Faster to compute than a [`MortonKey`] and used inside the stores; it holds the same index. From the top: `w_i +
-/// 2^20` without its three low bits for i = 0, 1, 2 (18 bits each), then those low bits.
+/// Faster to compute than a [`MortonKey`] and used inside the stores; it holds the same index. From the top:
+/// `w_i + 2^20` without its three low bits for i = 0, 1, 2 (18 bits each), then those low bits.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct BlockKey(u64);
 

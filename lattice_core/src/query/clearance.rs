@@ -13,7 +13,7 @@ use crate::voxels::VoxelStore;
 pub struct Clearance {
     /// Distance from the segment to the cell, metres; 0 if they touch or overlap.
     pub distance_m: f64,
-    /// The cell.
+    /// Key of the cell.
     pub key: MortonKey,
 }
 

@@ -8,9 +8,9 @@ use super::error::check_point;
 /// Line segment between two points of the map frame, metres; they may be equal.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Segment {
-    /// One end.
+    /// First end.
     pub from_m: Vector3<f64>,
-    /// The other end.
+    /// Second end.
     pub to_m: Vector3<f64>,
 }
 

@@ -16,8 +16,8 @@ const SLACK: f64 = 1e-9;
 
 /// Log-odds of cells `2^level` as wide as those of the map, with the same lattice point 0.
 ///
-/// A lattice is its own sublattice of level 1, so the coarse cell of a fine index `8 b + r` is that of `r` plus `8 b
-/// / 2^level`.
+/// A lattice is its own sublattice of level 1, so the coarse cell of a fine index `8 b + r` is that of `r` plus
+/// `8 b / 2^level`.
 #[derive(Clone)]
 pub(super) struct Coarse {
     lattice: Lattice,

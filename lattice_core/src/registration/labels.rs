@@ -65,7 +65,7 @@ impl LabelDistribution {
         pairs.take_while(|(_, weight)| *weight > 0.0)
     }
 
-    /// The most probable class.
+    /// Most probable class.
     pub fn top(&self) -> Option<u16> {
         self.iter().next().map(|(class, _)| class)
     }

@@ -104,7 +104,7 @@ impl DistortionSums {
     }
 }
 
-/// A sum times `part` / `whole`, rounded down; saturates.
+/// Scales a sum by `part` / `whole`, rounded down; saturates.
 pub(super) fn scaled(sum: u128, part: u64, whole: u64) -> u128 {
     let (part, whole) = (u128::from(part), u128::from(whole.max(1)));
     let rest = (sum % whole).saturating_mul(part) / whole;

@@ -9,7 +9,7 @@ use super::candidates::{Candidate, RegistrationContext};
 use super::reinterpreted_cloud::ReinterpretedCloud;
 use crate::pose::Axes;
 
-/// Search hypotheses under other axes, and those of them that get all iterations of the coarse refinement.
+/// Search hypotheses per axis convention: all, and the best ones that get all iterations of the coarse refinement.
 const MISREAD_PLACES: (usize, usize) = (48, 16);
 /// The same under another scale; more, because a scaled cloud nearly fits many poses.
 const SCALED_PLACES: (usize, usize) = (128, 64);
@@ -23,9 +23,7 @@ const SCALES: [f64; 4] = [0.8, 0.9, 1.11, 1.25];
 const MIN_SCALE_LEAD: f64 = 0.02;
 /// Log-likelihood ratio above which another convention is accepted.
 const ACCEPTED_LEAD: f64 = 40.0;
-/// Log-likelihood ratio below the negative of which another convention is ruled out.
-///
-/// With a prior of one misdeclared cloud in fifty, it leaves a probability of 1 %.
+/// Log-likelihood deficit above which another convention is ruled out.
 const RULED_OUT_LAG: f64 = 4.0;
 /// Lag in the rough score at which a correct hypothesis is still evaluated.
 const MAX_ROUGH_LAG: f64 = 0.03;

@@ -77,7 +77,7 @@ pub struct ClassReliability {
 /// Scale of the source points: length in the map over length in the source.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ScaleEstimate {
-    /// The scale.
+    /// Scale factor.
     pub scale: f64,
     /// Standard deviation of the scale.
     pub sigma: f64,

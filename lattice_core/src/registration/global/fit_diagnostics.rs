@@ -101,7 +101,7 @@ struct Region {
     near: usize,
     normals: Matrix3<f64>,
     residual_m: Vector3<f64>,
-    /// Traced lines of sight, those that end in free space, and those that pass through a surface.
+    /// Traced lines of sight; of these, the ones ending in free space and the ones passing through a surface.
     traced: usize,
     floating: usize,
     hidden: usize,

@@ -28,14 +28,14 @@ impl VoxelList {
         }))
     }
 
-    /// Removes the voxels for which `goes` is true, given shard, index in the shard and row.
+    /// Removes the voxels for which `is_removed` is true, given shard, index in the shard and row.
     pub(super) fn remove_where(
         &mut self,
-        goes: impl Fn(&Shard, usize, &Entry) -> bool + Sync,
+        is_removed: impl Fn(&Shard, usize, &Entry) -> bool + Sync,
     ) -> usize {
         let select = |shard: &Shard| {
             let rows = shard.iter().enumerate();
-            let gone = rows.filter(|(number, (_, entry))| goes(shard, *number, entry));
+            let gone = rows.filter(|(number, (_, entry))| is_removed(shard, *number, entry));
             gone.map(|(_, (code, _))| code).collect()
         };
         let gone = self.shards.par_iter().map(select).collect();

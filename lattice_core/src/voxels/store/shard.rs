@@ -33,7 +33,7 @@ impl Life {
     }
 }
 
-/// A voxel.
+/// Row of a voxel.
 #[derive(Clone)]
 pub(crate) struct Entry {
     pub(crate) code: u64,
