@@ -1,21 +1,21 @@
-//! A k-d tree that sorts the points: leaves are full blocks of eight, coordinate by coordinate.
+//! k-d tree over points in blocks of eight, stored by coordinate.
 //!
-//! Node [first, end) of blocks splits at its middle block, which also names the node: no pointers.
-//! Distances and bounds are summed in one order, so that rounding never hides a nearer point: answers
-//! are exact, and of equal distances the lowest index comes first.
+//! Node [first, end) of blocks splits at its middle block, which identifies the node without pointers. Distances and
+//! bounds are summed in one order, so that rounding never hides a nearer point. Results are exact; of equal distances
+//! the lowest index comes first.
 
 use nalgebra::Point3;
 
 use crate::lattice::Simd;
 
 pub(crate) const BLOCK: usize = 8;
-/// Smallest number of points whose halves are built in parallel.
+/// Minimum number of points whose halves are built in parallel.
 const PARALLEL: usize = 4096;
 
-/// Coordinates of eight points; infinite beyond the last.
+/// Coordinates of eight points; infinite in unused slots.
 type Block = [[f64; BLOCK]; 3];
 
-/// A point and its place in the cloud, while the tree is built.
+/// Point and its index in the cloud, during construction.
 #[derive(Clone, Copy)]
 pub(crate) struct Item {
     pub coords_m: [f64; 3],
@@ -29,10 +29,10 @@ struct Split {
     axis: u32,
 }
 
-/// Most nodes on the way to a leaf: blocks are numbered by 32 bits.
+/// Maximum depth: blocks are numbered by 32 bits.
 const DEPTH: usize = 32;
 
-/// Blocks [first, end), `off_m` from the query along each axis.
+/// Blocks [first, end) at distance `off_m` from the query along each axis.
 #[derive(Clone, Copy)]
 struct Node {
     first: u32,
@@ -40,22 +40,22 @@ struct Node {
     off_m: [f64; 4],
 }
 
-/// The tree. Answers are positions in the order of the points it was built to.
+/// k-d tree. Results are indices in the order of the sorted points.
 pub(crate) struct Tree {
     blocks: Vec<Block>,
     splits: Vec<Split>,
 }
 
-/// The results that a search keeps.
+/// Result set of a search.
 pub(crate) trait Keep {
-    /// Squared distance beyond which nothing is of interest.
+    /// Current squared search radius.
     fn reach(&self) -> f64;
-    /// A point within reach, or at it.
+    /// Offers a point within the search radius.
     fn offer(&mut self, index: u32, squared: f64);
 }
 
 impl Tree {
-    /// Sorts finite points into the order of the tree and builds it; the same on any number of threads.
+    /// Sorts finite points into the order of the tree and builds it; deterministic on any number of threads.
     pub(crate) fn build(items: &mut [Item]) -> Tree {
         let blocks = items.len().div_ceil(BLOCK);
         let mut splits = vec![Split::default(); blocks];
@@ -75,19 +75,20 @@ impl Tree {
         }
     }
 
-    /// Offers every point within the reach, those of nearer halves first.
+    /// Offers every point within the search radius, nearer halves first.
     #[inline]
     pub(crate) fn search(&self, query: &Point3<f64>, keep: &mut impl Keep) {
         #[cfg(target_arch = "x86_64")]
         if Simd::detect() == Simd::Avx2 {
-            // SAFETY: the machine has AVX2.
+            // SAFETY: AVX2 was detected.
             #[allow(unsafe_code)]
             return unsafe { self.search_avx2(query, keep) };
         }
         self.search_portably(query, keep);
     }
 
-    /// The same code with vectors of four; no fused multiply-add, so that no bit differs.
+    /// [`Tree::search_portably`] compiled for AVX2, without fused multiply-add, so that the results are
+    /// bit-identical.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     fn search_avx2(&self, query: &Point3<f64>, keep: &mut impl Keep) {
@@ -155,7 +156,7 @@ impl Tree {
     }
 }
 
-/// Sorts items so that each block is a leaf, and notes the splits (one for each block).
+/// Sorts items so that each block is a leaf, and records one split per block.
 fn sort(items: &mut [Item], splits: &mut [Split]) {
     if splits.len() < 2 {
         return;
@@ -174,7 +175,7 @@ fn sort(items: &mut [Item], splits: &mut [Split]) {
     let parallel = items.len() >= PARALLEL;
     let (left, right) = items.split_at_mut(middle * BLOCK);
     let (left_splits, right_splits) = splits.split_at_mut(middle);
-    // The first of the right splits is this node's own: a node's middle is never its first block.
+    // The first of the right splits belongs to this node: its middle block is never its first.
     if parallel {
         rayon::join(|| sort(left, left_splits), || sort(right, right_splits));
     } else {
@@ -215,7 +216,7 @@ impl Keep for Nearest {
     }
 }
 
-/// The nearest `k` points, nearest first; a buffer that searches use again and again.
+/// The `k` nearest points, nearest first; a buffer reused between searches.
 #[derive(Clone, Debug)]
 pub struct Neighbors {
     squared: [f64; MAX_NEIGHBORS],
@@ -225,7 +226,7 @@ pub struct Neighbors {
     reach: f64,
 }
 
-/// Most neighbours that a search finds.
+/// Maximum number of neighbours of a search.
 pub const MAX_NEIGHBORS: usize = 64;
 
 impl Default for Neighbors {
@@ -241,7 +242,7 @@ impl Default for Neighbors {
 }
 
 impl Neighbors {
-    /// Empty, for `k` neighbours (at most [`MAX_NEIGHBORS`]) within a squared distance.
+    /// Clears the buffer for `k` neighbours (at most [`MAX_NEIGHBORS`]) within a squared distance.
     pub(crate) fn start(&mut self, k: usize, squared: f64) {
         self.len = 0;
         self.k = k.min(MAX_NEIGHBORS);
@@ -252,23 +253,23 @@ impl Neighbors {
         };
     }
 
-    /// Neighbours found.
+    /// Number of neighbours found.
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// True if none was found.
+    /// Tests whether none was found.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Index and squared distance (m^2), the nearest first, of equal distances the lowest index.
+    /// Index and squared distance (m^2) of each neighbour, nearest first; of equal distances the lowest index first.
     pub fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let found = self.index.iter().zip(&self.squared).take(self.len);
         found.map(|(&index, &squared)| (index as usize, squared))
     }
 
-    /// Squared distance of the last of `k` neighbours, if there are so many.
+    /// Squared distance of the `k`-th neighbour, if there are `k`.
     pub(crate) fn farthest_of(&self, k: usize) -> Option<f64> {
         (self.len == k && k > 0).then(|| self.squared[k - 1])
     }

@@ -1,6 +1,4 @@
-//! Lattice occupied voxel lists: quantizers, voxel lists, geodesy, poses and clouds.
-//!
-//! A pure library: no ROS, no sockets, no clocks.
+//! Pure library without ROS, sockets or clocks.
 #![deny(unsafe_code)]
 
 pub mod cloud;

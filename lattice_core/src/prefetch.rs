@@ -1,7 +1,6 @@
 //! Prefetching of memory into the caches.
 
-/// Asks for the lines of memory that an item begins in, `LINES` of them; changes nothing that a
-/// program can see.
+/// Prefetches the first `LINES` cache lines of an item; no effect on results.
 #[inline(always)]
 #[allow(unsafe_code)]
 pub(crate) fn prefetch<const LINES: usize, T: ?Sized>(item: &T) {

@@ -1,4 +1,4 @@
-//! Arrays that calls give back.
+//! Arrays returned by calls.
 
 use numpy::{Element, PyArray, PyArrayMethods, PyUntypedArrayMethods, ndarray::Dimension};
 use pyo3::prelude::*;
@@ -6,7 +6,7 @@ use pyo3::types::PyTuple;
 
 use crate::errors::{mistyped, refuse};
 
-/// A new array of NumPy, whose values are void; what does not fit into memory is a `MemoryError`.
+/// Creates an uninitialized NumPy array; fails with `MemoryError` if it does not fit into memory.
 pub fn empty<'py, T: Element, D: Dimension>(
     py: Python<'py>,
     shape: &[usize],
@@ -18,7 +18,7 @@ pub fn empty<'py, T: Element, D: Dimension>(
     Ok(array.cast_into::<PyArray<T, D>>()?)
 }
 
-/// An array of these values.
+/// Creates an array of these values.
 pub fn array_of<'py, T: Element + Copy, D: Dimension>(
     py: Python<'py>,
     shape: &[usize],
@@ -32,7 +32,7 @@ pub fn array_of<'py, T: Element + Copy, D: Dimension>(
     Ok(array.into_any())
 }
 
-/// Rows of `N` values as an array of shape (n, N).
+/// Creates an array of shape (n, N) from rows of `N` values.
 pub fn rows_of<'py, T: Element + Copy, const N: usize>(
     py: Python<'py>,
     rows: &[[T; N]],
@@ -40,7 +40,7 @@ pub fn rows_of<'py, T: Element + Copy, const N: usize>(
     array_of::<T, numpy::Ix2>(py, &[rows.len(), N], rows.as_flattened())
 }
 
-/// The array of int32 of shape (`len`, 3) in C order that the caller gave as `out`.
+/// Validates the argument `out`: an int32 array of shape (`len`, 3) in C order.
 pub fn expect_out<'a, 'py>(
     out: &'a Bound<'py, PyAny>,
     len: usize,
@@ -61,7 +61,7 @@ pub fn expect_out<'a, 'py>(
     if !array.is_c_contiguous() {
         let strides = array.strides();
         return Err(refuse(format!(
-            "out cannot be written: its strides are {strides:?} bytes, not C order: give np.empty(({len}, 3), np.int32)"
+            "out is not writable: its strides are {strides:?} bytes, not C order: give np.empty(({len}, 3), np.int32)"
         )));
     }
     Ok(array)

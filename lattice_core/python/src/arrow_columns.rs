@@ -1,4 +1,4 @@
-//! Columns of a table, as engines return them, as integers.
+//! Columns of a table, as query engines return them, converted to integers.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use pyo3::PyResult;
 
 use crate::errors::{mistyped, refuse};
 
-/// Integers of a column of a batch without nulls, whatever their width; `None` if there is no such column.
+/// Integers of any width of a column without nulls; `None` if there is no such column.
 pub fn integers(batch: &RecordBatch, name: &str) -> PyResult<Option<Int64Array>> {
     let Some(column) = nullable_integers(batch, name)? else {
         return Ok(None);
@@ -30,7 +30,7 @@ pub fn integers(batch: &RecordBatch, name: &str) -> PyResult<Option<Int64Array>>
     Ok(Some(column))
 }
 
-/// The same with nulls.
+/// The same for a column with nulls.
 pub fn nullable_integers(batch: &RecordBatch, name: &str) -> PyResult<Option<Int64Array>> {
     let column = batch.column_by_name(name);
     column.map(|column| as_integers(column, name)).transpose()
@@ -47,11 +47,11 @@ fn as_integers(column: &ArrayRef, name: &str) -> PyResult<Int64Array> {
         DataType::UInt16 => each::<UInt16Type>(column, name, |v| Some(v.into())),
         DataType::UInt32 => each::<UInt32Type>(column, name, |v| Some(v.into())),
         DataType::UInt64 => each::<UInt64Type>(column, name, |v| v.try_into().ok()),
-        // Sums of engines that count beyond 64 bits.
+        // Sums of engines that use more than 64 bits.
         DataType::Decimal32(_, 0) => each::<Decimal32Type>(column, name, |v| Some(v.into())),
         DataType::Decimal64(_, 0) => each::<Decimal64Type>(column, name, Some),
         DataType::Decimal128(_, 0) => each::<Decimal128Type>(column, name, |v| v.try_into().ok()),
-        // What engines widen.
+        // Types that engines widen to.
         DataType::Float32 => each::<Float32Type>(column, name, |v| whole(v.into())),
         DataType::Float64 => each::<Float64Type>(column, name, whole),
         DataType::Timestamp(unit, _) if of_time => match unit {
@@ -80,7 +80,7 @@ fn as_integers(column: &ArrayRef, name: &str) -> PyResult<Int64Array> {
     }
 }
 
-/// Doubles that are whole numbers up to 2^53, beyond which neighbours are not told apart.
+/// Doubles that are integers up to 2^53, above which adjacent integers are not distinguished.
 fn whole(value: f64) -> Option<i64> {
     let most = (1_u64 << 53) as f64;
     (value.fract() == 0.0 && value.abs() <= most).then_some(value as i64)
@@ -102,7 +102,7 @@ fn each<T: ArrowPrimitiveType>(
     let value = |value: T::Native| {
         let no = || {
             refuse(format!(
-                "column {name:?} has {value:?}, no integer of 64 bits"
+                "column {name:?} has {value:?}, not a 64-bit integer"
             ))
         };
         integer(value).ok_or_else(no)
@@ -111,8 +111,8 @@ fn each<T: ArrowPrimitiveType>(
     values.map(|v| v.map(value).transpose()).collect()
 }
 
-/// The labels of each row of the lists `labels` of `{label, n}` with the sums of their points, ascending; none where the
-/// list is null. `None` if there is no such column.
+/// Labels of each row, from lists `labels` of `{label, n}`, summed and ascending; empty for a null list. `None` if
+/// there is no such column.
 pub fn labels(batch: &RecordBatch) -> PyResult<Option<Vec<Vec<LabelCount>>>> {
     let Some(column) = batch.column_by_name("labels") else {
         return Ok(None);

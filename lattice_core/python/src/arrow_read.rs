@@ -1,4 +1,4 @@
-//! Maps of Arrow tables, by the C data interface.
+//! Reading maps from Arrow tables, by the C data interface.
 
 use arrow_array::ffi_stream::ArrowArrayStreamReader;
 use arrow_array::{Array, Int64Array, RecordBatch, RecordBatchReader};
@@ -15,15 +15,15 @@ use crate::arrow_table::{COUNTED, HEAD};
 use crate::errors::{mistyped, refuse};
 use crate::threads::background;
 
-/// Cells that the caller names.
+/// Lattice and datum from the caller.
 pub struct Cells {
-    /// The lattice, where the table does not say it.
+    /// Lattice, if the table has none.
     pub lattice: Option<Lattice>,
-    /// The datum (m), where cells are not to be counted from that of the table.
+    /// Datum (m), if it differs from that of the table.
     pub datum_m: Option<Vector3<f64>>,
 }
 
-/// The map of any object with `__arrow_c_stream__`.
+/// Reads the map of any object with `__arrow_c_stream__`.
 pub fn map_of(py: Python<'_>, table: &Bound<'_, PyAny>, cells: Cells) -> PyResult<MapContents> {
     let reader = reader_of(table)?;
     let schema = reader.schema();
@@ -64,8 +64,8 @@ fn reader_of(table: &Bound<'_, PyAny>) -> PyResult<ArrowArrayStreamReader> {
         .cast::<PyCapsule>()
         .map_err(|_| mistyped("__arrow_c_stream__ gave no capsule"))?;
     let pointer = capsule.pointer_checked(Some(c"arrow_array_stream"))?;
-    // SAFETY: a capsule of this name holds a stream of the Arrow C interface, of which the reader takes the
-    // ownership and leaves a released one behind, as the interface demands of a consumer.
+    // SAFETY: a capsule of this name holds an Arrow C stream. The reader takes ownership and leaves a released one
+    // behind, as the interface requires of a consumer.
     let reader = unsafe { ArrowArrayStreamReader::from_raw(pointer.cast().as_ptr()) };
     reader.map_err(refuse)
 }
@@ -76,9 +76,10 @@ impl Cells {
     }
 }
 
-/// The map without rows that the metadata and the caller describe, and the points that its statistics are of.
+/// Creates the map without rows from the metadata and the caller's arguments, with the number of points of its
+/// statistics.
 fn head_of(schema: &Schema, cells: &Cells, batches: &[RecordBatch]) -> PyResult<(MapColumns, u64)> {
-    // A column of nulls is one that the map does not keep.
+    // A column of nulls is not kept by the map.
     let has = |name: &str| {
         let mut columns = batches.iter().filter_map(|b| b.column_by_name(name));
         schema.column_with_name(name).is_some()
@@ -145,7 +146,7 @@ fn read_head(digits: &str) -> PyResult<MapColumns> {
         .into())
 }
 
-/// Rows of all batches, in their order.
+/// Rows of all batches, in order.
 #[derive(Default)]
 struct Rows {
     cells: Vec<[i64; 3]>,
@@ -210,7 +211,7 @@ impl Rows {
         Ok(())
     }
 
-    /// The datum of cells that do not say theirs: 0 where that is near enough, or else the middle of them.
+    /// Datum of cells without one: 0 if it is near enough, else their centre.
     fn datum_index(&self) -> [i64; 3] {
         [0, 1, 2].map(|axis: usize| {
             let along = || self.cells.iter().map(|cell| cell[axis]);
@@ -223,7 +224,7 @@ impl Rows {
         })
     }
 
-    /// Puts the rows into the columns of a map, by their keys.
+    /// Converts the rows to columns of a map, by their keys.
     fn fill(mut self, map: &mut MapColumns) -> PyResult<()> {
         let datum = map.datum_index;
         let cells = self.cells.iter().enumerate();

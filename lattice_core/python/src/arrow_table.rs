@@ -1,4 +1,4 @@
-//! Maps as Arrow tables, by the C data interface.
+//! Writing maps as Arrow tables, by the C data interface.
 
 use std::sync::Arc;
 
@@ -16,12 +16,12 @@ use pyo3::types::PyCapsule;
 
 use crate::errors::refuse;
 
-/// Key of the schema's metadata: the map file of the map without its rows, in hexadecimal digits.
+/// Schema metadata key of the map file without its rows, in hexadecimal digits.
 pub const HEAD: &str = "lattice_map";
-/// Key of the schema's metadata: the sum of the counts.
+/// Schema metadata key of the sum of the counts.
 pub const COUNTED: &str = "lattice_map_counted";
 
-/// Rows of a map as Arrow.
+/// Rows of a map as an Arrow table.
 #[pyclass(frozen, module = "lattice_core")]
 pub struct Table {
     batch: RecordBatch,
@@ -29,7 +29,7 @@ pub struct Table {
 
 #[pymethods]
 impl Table {
-    /// The table as a stream of the Arrow C interface.
+    /// Exports the table as a stream of the Arrow C interface.
     #[pyo3(signature = (requested_schema=None))]
     fn __arrow_c_stream__<'py>(
         &self,
@@ -59,7 +59,7 @@ impl Table {
 }
 
 impl Table {
-    /// The rows of a map, in the order of its keys.
+    /// Rows of a map in key order.
     pub fn of(map: MapContents) -> PyResult<Table> {
         let map = MapColumns::from(map);
         let head = head_of(&map)?;
@@ -113,7 +113,7 @@ impl Table {
     }
 }
 
-/// The map file of the map without rows.
+/// Map file of the map without rows.
 fn head_of(map: &MapColumns) -> PyResult<String> {
     let columns = MapColumns {
         lattice: map.lattice.clone(),

@@ -1,8 +1,8 @@
 //! `calibrate`.
 
 use lattice_core::registration::{
-    CalibrationMap, CalibrationRequest, HeadsetScan, LabelDistribution, Profile, SemanticCloud,
-    calibrate as search,
+    CalibrationMap, CalibrationRequest, LabelDistribution, Profile, SemanticCloud, SourceCloud,
+    register_global,
 };
 use nalgebra::Point3;
 use pyo3::prelude::*;
@@ -16,24 +16,24 @@ use crate::pose::{isometry_of, matrix_of, matrix6_of};
 use crate::registration::cloud_of;
 use crate::threads::{background, on_pool};
 
-/// Pose of a cloud in a map, and whether it can be trusted.
+/// Pose of a cloud in a map, with its verdict.
 #[pyclass(frozen, get_all, module = "lattice_core")]
 pub struct Calibration {
-    /// OK, AMBIGUOUS, DEGENERATE, NO_OVERLAP or REJECTED_INPUT; the pose is to be used only with OK.
+    /// OK, AMBIGUOUS, DEGENERATE, NO_OVERLAP or REJECTED_INPUT; use the pose only with OK.
     verdict: String,
     /// Reason for the verdict.
     reason: String,
-    /// Takes points of the cloud to the map, shape (4, 4).
+    /// Transform of points of the cloud to the map, shape (4, 4).
     map_from_cloud: Py<PyAny>,
-    /// Covariance of x, y, z (m^2) and the turns about x, y, z (rad^2) in the map, shape (6, 6).
+    /// Covariance of x, y, z (m^2) and of the rotations about x, y, z (rad^2) in the map, shape (6, 6).
     covariance: Py<PyAny>,
-    /// Probability that another pose is right.
+    /// Probability of error, p_wrong.
     p_wrong: f64,
-    /// Share of the points on a surface of the map.
+    /// Fraction of inliers.
     inlier_fraction: f64,
-    /// Root mean square distance of those from the surfaces, m.
+    /// RMS distance of the inliers from the surfaces, m.
     rmse_m: f64,
-    /// Method that made the winning pose.
+    /// Method that found the pose.
     method: String,
 }
 
@@ -71,7 +71,7 @@ impl Calibration {
     }
 }
 
-/// Finds where a cloud (points, m, gravity along -z) lies in a map, without a guess, and judges the answer.
+/// Registers a cloud (points, m, gravity along -z) in a map without an initial guess, with a verdict.
 #[pyfunction]
 #[pyo3(signature = (map, xyz, labels=None, *, sensor=None, start=None, profile="headset"))]
 pub fn calibrate(
@@ -107,21 +107,21 @@ pub fn calibrate(
         on_pool(|| {
             let map = CalibrationMap::new(map, side_m);
             let map = map.map_err(|error| refuse(format!("map: {error}")))?;
-            let scans = [HeadsetScan {
+            let scans = [SourceCloud {
                 cloud,
                 sensor_m: sensor.map(Point3::from),
             }];
             let request = CalibrationRequest {
-                headset_scans: &scans,
+                source_clouds: &scans,
                 start,
                 confusion: None,
             };
-            Ok::<_, PyErr>(search(&map, &request, &profile.options(), stop))
+            Ok::<_, PyErr>(register_global(&map, &request, &profile.options(), stop))
         })?
     })??;
     Ok(Calibration {
         verdict: found.verdict.name().to_owned(),
-        map_from_cloud: matrix_of(py, &found.map_from_headset)?,
+        map_from_cloud: matrix_of(py, &found.target_from_source)?,
         covariance: matrix6_of(py, &found.covariance)?,
         p_wrong: found.margin.p_wrong(),
         inlier_fraction: found.inlier_fraction,

@@ -9,13 +9,13 @@ use crate::points::{first_true, mask_of, shape_of};
 
 /// Stamps of points, ns.
 pub enum StampColumn {
-    /// One for all.
+    /// One stamp for all points.
     All(i64),
-    /// One for each.
+    /// One stamp per point.
     Each(Vec<i64>),
 }
 
-/// Labels below 2^16, one for each of `count` points; -1 is [`UNLABELED`], masked ones are 0.
+/// Converts labels below 2^16, one per point; -1 is [`UNLABELED`], masked ones are 0.
 pub fn labels(array: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<u16>> {
     let array = unmasked(array)?;
     expect_integers(&array, "labels", "")?;
@@ -28,7 +28,7 @@ pub fn labels(array: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<u16>> {
     values.into_iter().enumerate().map(label).collect()
 }
 
-/// Integers (ns) or datetime64, one for all points or one for each of `count`; masked ones are 0.
+/// Converts integers (ns) or datetime64, one for all points or one per point; masked ones are 0.
 pub fn stamps(array: &Bound<'_, PyAny>, count: usize) -> PyResult<StampColumn> {
     let mut array = unmasked(array)?;
     let is_one = shape_of(&array)?.is_empty();
@@ -47,13 +47,13 @@ pub fn stamps(array: &Bound<'_, PyAny>, count: usize) -> PyResult<StampColumn> {
     })
 }
 
-/// The rows of `keep`.
+/// Selects the rows of `keep`.
 pub fn kept<T: Copy>(values: &[T], keep: &[bool]) -> Vec<T> {
     let rows = values.iter().zip(keep).filter(|(_, keep)| **keep);
     rows.map(|(value, _)| *value).collect()
 }
 
-/// The array with 0 in the place of what is masked.
+/// Replaces masked values by 0.
 fn unmasked<'py>(array: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let numpy = array.py().import("numpy")?;
     match mask_of(array)? {
@@ -72,7 +72,7 @@ fn expect_integers(array: &Bound<'_, PyAny>, name: &str, or: &str) -> PyResult<(
         return Ok(());
     }
     let dtype = array.getattr("dtype")?;
-    // Python's integers of more than 64 bits become objects.
+    // Python integers of more than 64 bits become objects.
     if kind == "O"
         && let Ok(value) = array.call_method0("max")
         && value.is_instance_of::<pyo3::types::PyInt>()
@@ -110,7 +110,7 @@ fn integers(array: &Bound<'_, PyAny>, name: &str, count: usize) -> PyResult<Vec<
     Ok(array.as_slice().map_err(refuse)?.to_vec())
 }
 
-/// Times of datetime64 as integers, ns since 1970.
+/// Converts datetime64 to integers, ns since 1970.
 fn nanoseconds<'py>(times: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let numpy = times.py().import("numpy")?;
     let refused = |flags: Bound<'py, PyAny>, why: &str| -> PyResult<()> {

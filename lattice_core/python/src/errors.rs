@@ -1,4 +1,4 @@
-//! Refusals as the exceptions that users of NumPy know.
+//! Errors as the exceptions that NumPy raises.
 
 use std::io;
 use std::path::Path;
@@ -7,17 +7,17 @@ use lattice_core::voxels::file::FileError;
 use pyo3::PyErr;
 use pyo3::exceptions::{PyOSError, PyTypeError, PyValueError};
 
-/// A value that is refused.
+/// `ValueError`.
 pub fn refuse(reason: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(reason.to_string())
 }
 
-/// An object or array of a type that is not taken.
+/// `TypeError`.
 pub fn mistyped(reason: impl std::fmt::Display) -> PyErr {
     PyTypeError::new_err(reason.to_string())
 }
 
-/// An error of the system about a path: `FileNotFoundError`, `PermissionError` and so on, by its number.
+/// `OSError` of a path by its number: `FileNotFoundError`, `PermissionError` and so on.
 pub fn of_path(path: &Path, error: &io::Error) -> PyErr {
     match error.raw_os_error() {
         Some(number) => {
@@ -29,7 +29,7 @@ pub fn of_path(path: &Path, error: &io::Error) -> PyErr {
     }
 }
 
-/// An error of a map file.
+/// Error of a map file.
 pub fn of_map_file(path: &Path, error: &FileError) -> PyErr {
     match error {
         FileError::Io { source, .. } if source.raw_os_error().is_some() => of_path(path, source),

@@ -1,4 +1,4 @@
-//! Inserting points of NumPy into a map.
+//! Inserting NumPy points into a map.
 
 use lattice_core::voxels::{InsertReport, PointColumns};
 use nalgebra::Vector3;
@@ -12,12 +12,12 @@ use crate::points::{Points, Rows, mask_of, part, warn_of_rounding};
 use crate::shared_list::SharedList;
 use crate::threads::on_pool;
 
-/// Points between two looks for signals: well below half a second.
+/// Points between two checks for signals, well below half a second.
 const STEP: usize = 1 << 18;
-/// The same with labels or stamps, which one thread adds.
+/// The same with labels or stamps, which one thread inserts.
 const STEP_OF_COLUMNS: usize = 1 << 16;
 
-/// Adds points with their labels and stamps; rows in which something is masked are left out and counted.
+/// Inserts points with their labels and stamps; rows with a masked value are dropped and counted.
 pub fn insert<'py>(
     py: Python<'py>,
     list: &SharedList,
@@ -100,7 +100,7 @@ pub fn insert<'py>(
     Ok(answer)
 }
 
-/// True for each row in which nothing is masked; `None` if that is all.
+/// Mask of the rows without masked values; `None` if nothing is masked.
 fn unmasked_rows<'py>(
     py: Python<'py>,
     xyz: &Bound<'py, PyAny>,
@@ -128,7 +128,7 @@ fn unmasked_rows<'py>(
         .transpose()
 }
 
-/// The refusal of points of which none is near the datum.
+/// Error for points of which none is near the datum.
 fn out_of_reach(py: Python<'_>, list: &SharedList, rows: Rows) -> PyResult<PyErr> {
     let datum: [f64; 3] = list.read(py, |list| list.datum_m().into())?;
     let mut finite = (0..rows.len()).map(|i| rows.get(i));

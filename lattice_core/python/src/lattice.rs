@@ -17,12 +17,12 @@ use crate::pickle::Reduced;
 use crate::points::{Points, Rows, mask_of, shape_of};
 use crate::threads::step;
 
-/// Rows that a thread takes at a time.
+/// Rows per task.
 const PART: usize = 1 << 14;
-/// Rows between two looks for signals: some 0.1 s of a thread.
+/// Rows between two checks for signals, 0.1 s of one thread.
 const STEP: usize = 1 << 22;
 
-/// A lattice of cells of one volume: cubic, bcc, fcc, mcc, hex or hexopt.
+/// Lattice of cells of one volume: cubic, bcc, fcc, mcc, hex or hexopt.
 #[pyclass(frozen, module = "lattice_core")]
 pub struct Lattice {
     pub core: Core,
@@ -30,7 +30,7 @@ pub struct Lattice {
 
 #[pymethods]
 impl Lattice {
-    /// Cells of `volume` m^3 of the lattice with this name.
+    /// Creates a lattice by name with cells of `volume` m^3.
     #[new]
     fn new(name: &str, volume: f64) -> PyResult<Self> {
         let kind: LatticeKind = name.parse().map_err(refuse)?;
@@ -58,7 +58,7 @@ impl Lattice {
         rows_of(py, &[row(0), row(1), row(2)])
     }
 
-    /// Lattice indices of the cells of points (m), int32 of shape (n, 3); into `out` where given.
+    /// Lattice indices of the cells of points (m), int32 of shape (n, 3); written to `out` if given.
     #[pyo3(signature = (xyz, *, out=None))]
     fn quantize<'py>(
         &self,
@@ -114,7 +114,7 @@ impl Lattice {
         hasher.finish()
     }
 
-    /// As the file of an empty map, which keeps the orientation and the basis too.
+    /// Pickles as the file of an empty map, which keeps the orientation and the basis.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py> {
         let list = VoxelList::new(slf.get().core.clone(), Vector3::zeros(), 0).map_err(refuse)?;
         let mut bytes = Vec::new();
@@ -143,7 +143,7 @@ impl Lattice {
     ) -> PyResult<()> {
         let why = |error| {
             refuse(format!(
-                "out cannot be written: {error}; or it shares memory with xyz"
+                "out is not writable: {error}; or it shares memory with xyz"
             ))
         };
         let mut cells = array.try_readwrite().map_err(why)?;
@@ -166,7 +166,7 @@ impl Lattice {
         Ok(())
     }
 
-    /// Writes the cells of the rows, on all threads; the first row that is in none.
+    /// Writes the cells of the rows, on all threads; returns the first row without a cell.
     fn quantize_rows(&self, rows: Rows, cells: &mut [LatticeIndex]) -> Option<usize> {
         let parts = cells.par_chunks_mut(PART).enumerate();
         let first_bad = parts.filter_map(|(number, cells)| {
@@ -185,7 +185,7 @@ impl Lattice {
         }
     }
 
-    /// Writes the cells of rows in double precision, one at a time; the first row that is in none.
+    /// Writes the cells of rows in double precision, one at a time; returns the first row without a cell.
     fn exactly(&self, rows: &[[f64; 3]], cells: &mut [LatticeIndex]) -> Option<usize> {
         let (mut bad, mut to) = (None, cells.iter_mut().enumerate());
         self.core.quantize_each(rows.iter().copied(), |_, cell| {
@@ -199,7 +199,7 @@ impl Lattice {
     }
 }
 
-/// Lattice indices of shape (n, 3).
+/// Validates lattice indices of shape (n, 3).
 fn indices<'py>(cells: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, i64>> {
     let numpy = cells.py().import("numpy")?;
     if mask_of(cells)?.is_some() {

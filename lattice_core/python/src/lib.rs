@@ -1,6 +1,6 @@
 //! Python package of the core: lattices, voxel maps, registration.
 //!
-//! Points come as NumPy arrays, which are read where they are; the GIL is free while Rust works.
+//! NumPy arrays are borrowed without a copy; the GIL is released while Rust works.
 
 mod arrays;
 mod arrow_columns;

@@ -19,10 +19,10 @@ use crate::shared_list::SharedList;
 use crate::threads::{background, on_pool};
 use crate::{insert, map_arrays, map_files, query};
 
-/// Coordinates of a datum are below this, m: offsets of 2^-20 m from it are exact in double precision.
+/// Bound of the datum coordinates, m: offsets of 2^-20 m from it are exact in double precision.
 const MAX_DATUM_M: f64 = (1_u64 << 31) as f64;
 
-/// The occupied voxels of a lattice: counts, mean offsets, and if wanted stamps and labels.
+/// Occupied voxels of a lattice: counts, mean offsets and optional stamps and labels.
 #[pyclass(frozen, module = "lattice_core")]
 pub struct VoxelMap {
     pub list: SharedList,
@@ -32,7 +32,7 @@ pub struct VoxelMap {
 
 #[pymethods]
 impl VoxelMap {
-    /// An empty map; its cells are counted from the one at `datum` (m).
+    /// Creates an empty map; its cells count from the one at `datum` (m).
     #[new]
     #[pyo3(signature = (lattice, datum=[0.0; 3], *, labels=false, stamps=false, max_voxels=usize::MAX))]
     fn new(
@@ -52,7 +52,8 @@ impl VoxelMap {
         Ok(Self::of(list))
     }
 
-    /// Adds points (m), with a label for each and a stamp for each or for all; says what became of them.
+    /// Adds points (m), with one label per point and a stamp per point or for all; returns the counts of the
+    /// outcomes.
     #[pyo3(signature = (xyz, labels=None, stamps=None))]
     fn insert<'py>(
         &self,
@@ -68,7 +69,7 @@ impl VoxelMap {
     fn merge(&self, py: Python<'_>, other: &VoxelMap) -> PyResult<()> {
         let (list, other) = (self.list.clone(), other.list.clone());
         background(py, move |stop| {
-            // Never under both locks at once.
+            // Only one lock is held at a time.
             let other = other.copied()?;
             list.write_away(|list| {
                 let merged = on_pool(|| merged(list, other))??;
@@ -80,7 +81,7 @@ impl VoxelMap {
         })?
     }
 
-    /// The voxels whose centres are in the closed box between two corners (m), as a map of their own.
+    /// Map of the voxels whose centres are in the closed box between two corners (m).
     fn crop(&self, py: Python<'_>, low: [f64; 3], high: [f64; 3]) -> PyResult<Self> {
         let region = Region::cuboid(low.into(), high.into()).map_err(refuse)?;
         let list = self.list.clone();
@@ -93,14 +94,15 @@ impl VoxelMap {
         Ok(Self::of(cropped))
     }
 
-    /// The map as an Arrow table (`__arrow_c_stream__`), which pyarrow, Polars and DuckDB take.
+    /// Converts to an Arrow table (`__arrow_c_stream__`) for pyarrow, Polars and DuckDB.
     fn to_arrow(&self, py: Python<'_>) -> PyResult<Table> {
         let list = self.list.clone();
         background(py, move |_| Table::of(list.copied()?))?
     }
 
-    /// The map of an Arrow table of cells in any order, such as `to_arrow` makes; `lattice`, and `datum` (m) if wanted, where
-    /// an engine has dropped them.
+    /// Creates a map from an Arrow table of cells in any order, such as that of `to_arrow`.
+    ///
+    /// `lattice`, and optionally `datum` (m), replace metadata that an engine has dropped.
     #[staticmethod]
     #[pyo3(signature = (table, *, lattice=None, datum=None))]
     fn from_arrow(
@@ -124,7 +126,8 @@ impl VoxelMap {
         Self::of_contents(py, map)
     }
 
-    /// Writes a map file, packed by zstd at a level from 1 to 19 if given; after an error the one before stays.
+    /// Writes a map file, compressed by zstd at a level from 1 to 19 if given; after an error the previous file
+    /// stays.
     #[pyo3(signature = (path, zstd=None))]
     fn save(&self, py: Python<'_>, path: PathBuf, zstd: Option<i32>) -> PyResult<()> {
         let options = WriteOptions {
@@ -137,8 +140,8 @@ impl VoxelMap {
         })?
     }
 
-    /// Distances (m), shape (n, k), and centres, shape (n, k, 3), of the `k` occupied cells nearest to each point, or of all
-    /// cells if there are fewer.
+    /// Distances (m), shape (n, k), and centres, shape (n, k, 3), of the `k` occupied cells nearest to each point;
+    /// fewer if there are fewer cells.
     #[pyo3(signature = (xyz, k=1))]
     fn query<'py>(
         &self,
@@ -163,7 +166,7 @@ impl VoxelMap {
         map_arrays::cells(py, &self.list)
     }
 
-    /// Points in each occupied cell, uint32 of shape (n,).
+    /// Number of points in each occupied cell, uint32 of shape (n,).
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         map_arrays::counts(py, &self.list)
     }
@@ -191,14 +194,14 @@ impl VoxelMap {
         }
     }
 
-    /// Centre of the cell that cells are counted from, m.
+    /// Datum: centre of the cell that indices count from, m.
     #[getter]
     fn datum(&self, py: Python<'_>) -> PyResult<(f64, f64, f64)> {
         let [x, y, z] = self.list.read(py, |list| list.datum_m().into())?;
         Ok((x, y, z))
     }
 
-    /// Number of points that were inserted.
+    /// Number of inserted points.
     #[getter]
     fn points(&self, py: Python<'_>) -> PyResult<u64> {
         self.list.read(py, |list| list.distortion().points)
@@ -216,7 +219,7 @@ impl VoxelMap {
         ))
     }
 
-    /// True for maps of the same voxels about the same datum.
+    /// Tests whether two maps have the same voxels and datum.
     fn __eq__(&self, py: Python<'_>, other: &VoxelMap) -> PyResult<bool> {
         let (ours, theirs) = (self.list.clone(), other.list.clone());
         background(py, move |_| {
@@ -224,7 +227,7 @@ impl VoxelMap {
         })?
     }
 
-    /// As a map file and the bound of its voxels.
+    /// Pickles as a map file and the limit of its voxels.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py> {
         let py = slf.py();
         let list = slf.get().list.clone();
@@ -268,7 +271,7 @@ fn merged(list: &VoxelList, other: MapContents) -> PyResult<VoxelList> {
     match voxels <= most {
         true => Ok(merged.into_list_with(list.payload(), most)),
         false => Err(refuse(format!(
-            "{voxels} voxels are more than max_voxels, {most}"
+            "voxel count {voxels} is above max_voxels {most}"
         ))),
     }
 }

@@ -1,4 +1,4 @@
-//! Columns of a map as arrays of NumPy, a row for each occupied cell, in the order of the keys.
+//! Columns of a map as NumPy arrays, one row per occupied cell in key order.
 
 use lattice_core::lattice::MortonKey;
 use lattice_core::registration::UNLABELED;
@@ -35,7 +35,7 @@ pub fn cells<'py>(py: Python<'py>, list: &SharedList) -> PyResult<Bound<'py, PyA
     rows_of(py, &cells)
 }
 
-/// Points in each cell.
+/// Number of points in each cell.
 pub fn counts<'py>(py: Python<'py>, list: &SharedList) -> PyResult<Bound<'py, PyAny>> {
     let counts = of_map(py, list, |map| {
         let voxels = map.voxels().unwrap_or_default().iter();
@@ -57,7 +57,7 @@ pub fn means<'py>(py: Python<'py>, list: &SharedList) -> PyResult<Bound<'py, PyA
     rows_of(py, &means)
 }
 
-/// The most frequent label of each cell, -1 where it has none.
+/// Most frequent label of each cell; -1 without one.
 pub fn labels<'py>(py: Python<'py>, list: &SharedList) -> PyResult<Bound<'py, PyAny>> {
     let labels = of_map(py, list, |map| {
         let columns = MapColumns::from(map);
@@ -75,14 +75,14 @@ pub fn labels<'py>(py: Python<'py>, list: &SharedList) -> PyResult<Bound<'py, Py
     array_of::<i32, Ix1>(py, &[labels.len()], &labels)
 }
 
-/// Stamps of the first and the last point of each cell, NaT where it has none.
+/// Stamps of the first and the last point of each cell; NaT without one.
 pub fn stamps<'py>(py: Python<'py>, list: &SharedList) -> PyResult<Bound<'py, PyAny>> {
     let stamps = of_map(py, list, |map| {
         let columns = MapColumns::from(map);
         let stamps = columns
             .stamps
             .ok_or_else(|| refuse("this map keeps no stamps: maps made with stamps=True do"))?;
-        // NumPy's NaT is the least integer.
+        // NumPy's NaT is the smallest integer.
         let pair = |stamps: &Stamps| match *stamps == Stamps::NONE {
             true => [i64::MIN; 2],
             false => [stamps.first_ns, stamps.last_ns],
@@ -93,7 +93,7 @@ pub fn stamps<'py>(py: Python<'py>, list: &SharedList) -> PyResult<Bound<'py, Py
     stamps.call_method1("view", ("datetime64[ns]",))
 }
 
-/// The voxels of a map without the statistics of its points.
+/// Voxels of a map without the statistics of its points.
 pub fn rows(list: &SharedList) -> PyResult<MapColumns> {
     let mut columns = MapColumns::from(list.copied()?);
     columns.statistics = DistortionSums::default();

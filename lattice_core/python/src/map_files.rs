@@ -1,4 +1,4 @@
-//! Map files, and files that take their place whole: after an error the one before stays.
+//! Map files, and atomic file writes: after an error the previous file stays.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -32,7 +32,7 @@ pub fn save(map: &MapContents, path: &Path, options: &WriteOptions, stop: &Stop)
     replace(path, write, stop)
 }
 
-/// Writes a file beside the one that is there, then takes its place. A pipe or device is written at once.
+/// Writes a temporary file beside the existing one, then replaces it. A pipe or device is written directly.
 pub fn replace(
     path: &Path,
     write: impl Fn(&mut File) -> PyResult<()>,
@@ -62,7 +62,7 @@ pub fn replace(
     Ok(())
 }
 
-/// A file of a name of its own in the folder of another; removed unless its path is taken away.
+/// Temporary file in the folder of another; removed unless its path is taken.
 struct Beside {
     file: File,
     path: PathBuf,
@@ -81,7 +81,7 @@ impl Beside {
             let path = path.with_file_name(own);
             match File::options().write(true).create_new(true).open(&path) {
                 Ok(file) => return Ok(Beside { file, path }),
-                // Of a process of this number that was killed.
+                // Left by a killed process of the same number.
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
             }
@@ -92,13 +92,13 @@ impl Beside {
 impl Drop for Beside {
     fn drop(&mut self) {
         if self.path != PathBuf::new() {
-            // Whatever the error that is on its way.
+            // Independent of the error being returned.
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// A file that fails after its call was interrupted.
+/// File that fails after its call was interrupted.
 pub struct Stoppable<'a, F> {
     pub file: F,
     pub stop: &'a Stop,
@@ -106,7 +106,7 @@ pub struct Stoppable<'a, F> {
 
 impl<F> Stoppable<'_, F> {
     fn check(&self) -> io::Result<()> {
-        // Not `Interrupted`, after which writers try again.
+        // Not `Interrupted`, after which writers retry.
         match self.stop.is_set() {
             true => Err(io::Error::other("interrupted")),
             false => Ok(()),

@@ -1,4 +1,4 @@
-//! Points of NumPy: float32 or float64 rows of x, y, z.
+//! NumPy points: float32 or float64 rows of x, y, z.
 
 use numpy::{PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyUserWarning;
@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 
 use crate::errors::{mistyped, refuse};
 
-/// Points as NumPy holds them; the rows are borrowed, not copied.
+/// Points held by NumPy; the rows are borrowed, not copied.
 pub enum Points<'py> {
     /// Single precision.
     F32(PyReadonlyArray2<'py, f32>),
@@ -14,7 +14,7 @@ pub enum Points<'py> {
     F64(PyReadonlyArray2<'py, f64>),
 }
 
-/// The rows of [`Points`], which threads without the GIL may read.
+/// Rows of [`Points`], readable by threads without the GIL.
 #[derive(Clone, Copy)]
 pub enum Rows<'a> {
     /// Single precision.
@@ -24,7 +24,7 @@ pub enum Rows<'a> {
 }
 
 impl<'py> Points<'py> {
-    /// An array of shape (n, 3) without masked values; other layouts, byte orders and numbers are copied by NumPy.
+    /// Accepts an array of shape (n, 3) without masked values; NumPy copies other layouts, byte orders and types.
     pub fn of(array: &Bound<'py, PyAny>) -> PyResult<Points<'py>> {
         if let Some(mask) = mask_of(array)? {
             let row = first_true(&mask.call_method1("any", (-1,))?)?;
@@ -35,7 +35,7 @@ impl<'py> Points<'py> {
         Points::unmasked(array)
     }
 
-    /// An array of shape (n, 3), whatever is masked.
+    /// Accepts an array of shape (n, 3), masked or not.
     pub fn unmasked(array: &Bound<'py, PyAny>) -> PyResult<Points<'py>> {
         let numpy = array.py().import("numpy")?;
         let array = numpy.call_method1("asarray", (array,))?;
@@ -55,7 +55,7 @@ impl<'py> Points<'py> {
                 )));
             }
         };
-        // In rows one after another, aligned, in the byte order of the machine.
+        // Contiguous rows, aligned, in native byte order.
         let array = numpy.call_method1("require", (array, precision, ["C", "A"]))?;
         match precision {
             "float32" => Ok(Points::F32(array.extract()?)),
@@ -63,7 +63,7 @@ impl<'py> Points<'py> {
         }
     }
 
-    /// The rows.
+    /// Borrows the rows.
     pub fn rows(&self) -> PyResult<Rows<'_>> {
         Ok(match self {
             Points::F32(array) => Rows::F32(array.as_slice().map_err(refuse)?.as_chunks().0),
@@ -81,7 +81,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Point `i` in double precision; NaN beyond the last.
+    /// Point `i` in double precision; NaN if out of range.
     pub fn get(&self, i: usize) -> [f64; 3] {
         let row = match self {
             Rows::F32(rows) => rows.get(i).map(|row| row.map(f64::from)),
@@ -99,12 +99,12 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Points that are looked at for their precision.
+/// Number of points sampled for their precision.
 const SAMPLES: usize = 16;
-/// Share of a cell's side that rounding may move a point by unsaid: a tenth moves one in some three to another cell.
+/// Rounding error above which a warning is issued, in cell sizes: 0.1 moves one point in three to another cell.
 const COARSE: f64 = 0.1;
 
-/// Warns of points in single precision that are so far from the origin that rounding moves many to other cells.
+/// Warns of single-precision points so far from the origin that rounding moves many to other cells.
 pub fn warn_of_rounding(py: Python<'_>, rows: Rows, side_m: f64) -> PyResult<()> {
     let Rows::F32(rows) = rows else {
         return Ok(());
@@ -135,7 +135,7 @@ pub fn shape_of(array: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
     Ok(array.cast::<PyUntypedArray>()?.shape().to_vec())
 }
 
-/// The mask of a masked array in which something is masked.
+/// Mask of a masked array, if something is masked.
 pub fn mask_of<'py>(array: &Bound<'py, PyAny>) -> PyResult<Option<Bound<'py, PyAny>>> {
     let masked = array.py().import("numpy")?.getattr("ma")?;
     if !masked
@@ -149,7 +149,7 @@ pub fn mask_of<'py>(array: &Bound<'py, PyAny>) -> PyResult<Option<Bound<'py, PyA
     Ok(any.then_some(mask))
 }
 
-/// The place of the first True of an array of them.
+/// Index of the first true value.
 pub fn first_true(flags: &Bound<'_, PyAny>) -> PyResult<usize> {
     flags.call_method0("argmax")?.extract()
 }

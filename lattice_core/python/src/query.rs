@@ -1,4 +1,4 @@
-//! The nearest occupied cells of many points.
+//! Nearest occupied cells of many points.
 
 use std::sync::Arc;
 
@@ -14,11 +14,11 @@ use crate::points::{Points, Rows};
 use crate::shared_list::SharedList;
 use crate::threads::{on_pool, watched};
 
-/// Points that a thread takes at a time: near each other in most clouds, as are the cells about them.
+/// Points per task: close to each other in most clouds, as are the cells around them.
 const PART: usize = 64;
 
-/// Distances, shape (n, k), and centres, shape (n, k, 3), of the `k` cells nearest to each point, or of all if there are
-/// fewer.
+/// Distances, shape (n, k), and centres, shape (n, k, 3), of the `k` cells nearest to each point; fewer if there are
+/// fewer cells.
 pub fn query<'py>(
     py: Python<'py>,
     shared: &SharedList,
@@ -63,7 +63,7 @@ pub fn query<'py>(
     Ok((distances.into_any(), centers.into_any()))
 }
 
-/// Writes the cells nearest to a point; infinite and NaN where cells went meanwhile.
+/// Writes the cells nearest to a point; infinite and NaN if cells were removed meanwhile.
 fn nearest(
     questions: &Query<lattice_core::voxels::VoxelList>,
     rows: Rows,

@@ -13,29 +13,31 @@ use crate::points::Points;
 use crate::pose::{isometry_of, matrix_of, matrix6_of};
 use crate::threads::{background, on_threads};
 
-/// Most threads of a call, more than a machine has cores.
+/// Maximum number of threads, above the cores of a machine.
 const MAX_THREADS: i64 = 1024;
-/// Most iterations, beyond any that converges.
+/// Maximum number of iterations, above any that converges.
 const MAX_ITERATIONS: i64 = 1_000_000;
 
 /// Result of a single registration.
 #[pyclass(frozen, get_all, module = "lattice_core")]
 pub struct Registration {
-    /// Takes source points to the target frame, shape (4, 4).
+    /// Transform of source points to the target frame, shape (4, 4).
     target_from_source: Py<PyAny>,
-    /// Covariance of x, y, z (m^2) and the turns about x, y, z (rad^2) in the target, shape (6, 6); NaN where the points
-    /// do not determine the pose. Of a source more than 100 m from its origin x, y, z are of its middle.
+    /// Covariance of x, y, z (m^2) and of the rotations about x, y, z (rad^2) in the target, shape (6, 6); NaN if the
+    /// points do not determine the pose.
+    ///
+    /// For a source more than 100 m from its origin, x, y, z refer to its centroid.
     covariance: Py<PyAny>,
-    /// Half the Hessian of the cost by a translation (m), then a rotation (rad) in the source, shape (6, 6), about the
-    /// same point.
+    /// Half the Hessian of the cost by a translation (m), then a rotation (rad) in the source, shape (6, 6), about
+    /// the same point.
     hessian: Py<PyAny>,
     /// True if the last step was below the tolerances.
     converged: bool,
-    /// Searches for pairs.
+    /// Number of correspondence searches.
     iterations: usize,
-    /// Source points with a pair.
+    /// Number of source points with a correspondence.
     inliers: usize,
-    /// Root of the mean of the squared distances, m.
+    /// RMS distance, m.
     rmse_m: f64,
 }
 
@@ -77,7 +79,7 @@ impl Registration {
     }
 }
 
-/// Registers `source` to `target` (points, m) by GICP from `init` (4 x 4); `cell` thins both first (m).
+/// Registers `source` to `target` (points, m) by GICP from `init` (4 x 4); `cell` downsamples both first (m).
 #[pyfunction]
 #[pyo3(signature = (
     source, target, init=None, *, max_distance=1.0, cell=None, num_neighbors=10, num_threads=None, max_iterations=20
@@ -96,7 +98,9 @@ pub fn gicp(
 ) -> PyResult<Registration> {
     for (name, value) in [("max_distance", Some(max_distance)), ("cell", cell)] {
         if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
-            return Err(refuse(format!("{name} {value} m is not a length over 0")));
+            return Err(refuse(format!(
+                "{name} {value} m is not positive and finite"
+            )));
         }
     }
     let neighbors = count("num_neighbors", num_neighbors, 3, MAX_NEIGHBORS as i64)?;
@@ -138,9 +142,10 @@ pub fn gicp(
     })
 }
 
-/// The inverse of the Hessian times the variance of a pair, in the axes of the target. A pair measures one distance,
-/// across its plane, in units of a variance that is known up to a factor: the cost for each pair beyond the six that
-/// the pose takes.
+/// Inverse of the Hessian times the variance of a correspondence, in the axes of the target.
+///
+/// A correspondence measures one distance, across its plane. Its variance is the cost per correspondence beyond the
+/// six degrees of freedom of the pose.
 fn covariance(found: &Found) -> Matrix6<f64> {
     let free = found.inliers.saturating_sub(6);
     let inverse = found.hessian.cholesky().map(|parts| parts.inverse());
@@ -160,7 +165,7 @@ fn count(name: &str, value: i64, least: i64, most: i64) -> PyResult<usize> {
     value_in.ok_or_else(|| refuse(format!("{name} {value} is outside {least}..={most}")))
 }
 
-/// Points as a cloud; a row that is not finite is refused.
+/// Converts points to a cloud; rejects rows that are not finite.
 pub fn cloud_of(name: &str, xyz: &Bound<'_, PyAny>) -> PyResult<SemanticCloud> {
     let points = Points::of(xyz)?;
     let rows = points.rows()?;

@@ -1,4 +1,4 @@
-//! The voxel list of a map, which threads of Python share.
+//! Voxel list of a map, shared between Python threads.
 
 use std::sync::Arc;
 
@@ -10,14 +10,13 @@ use pyo3::prelude::*;
 
 use crate::threads::{PATIENCE, on_pool};
 
-/// A tree of all cells takes the time of half a neighbour for each, so that it is soon worth it, and stays until the map
-/// changes: from a neighbour for each so many cells on.
+/// Neighbours per cell from which a tree of all cells pays off: building it takes the time of half a neighbour per
+/// cell, and it stays until the map changes.
 const WORTH: usize = 8;
 
-/// A list behind one lock.
+/// List behind one lock.
 ///
-/// Nobody waits for the lock with the GIL or on a thread of the pool, and no Python runs under the lock: so none of the
-/// three waits for another.
+/// The lock is never awaited with the GIL or on a pool thread, and no Python runs under it, so they cannot deadlock.
 #[derive(Clone)]
 pub struct SharedList(Arc<Shared>);
 
@@ -26,12 +25,12 @@ struct Shared {
     asked: Mutex<Asked>,
 }
 
-/// Questions about the list as it is now.
+/// Queries of the current list.
 #[derive(Default)]
 struct Asked {
-    /// Neighbours that were asked for.
+    /// Number of neighbours requested.
     neighbors: usize,
-    /// The tree of its cells, once that is worth it.
+    /// Tree of its cells, once it pays off.
     prepared: Option<PreparedNearest>,
 }
 
@@ -43,7 +42,7 @@ impl SharedList {
         }))
     }
 
-    /// Runs on the list beside other readers, for well below a second.
+    /// Reads the list beside other readers, for well below a second.
     pub fn read<T: Send>(
         &self,
         py: Python<'_>,
@@ -82,19 +81,19 @@ impl SharedList {
         }
     }
 
-    /// Runs on the list from a thread without the GIL, however long.
+    /// Reads the list from a thread without the GIL, for any time.
     pub fn read_away<T>(&self, run: impl FnOnce(&VoxelList) -> T) -> T {
         run(&self.0.list.read())
     }
 
-    /// Changes the list from a thread without the GIL, however long.
+    /// Changes the list from a thread without the GIL, for any time.
     pub fn write_away<T>(&self, run: impl FnOnce(&mut VoxelList) -> T) -> T {
         let mut list = self.0.list.write();
         *self.0.asked.lock() = Asked::default();
         run(&mut list)
     }
 
-    /// Questions about the list, from a thread without the GIL that will ask for so many neighbours. `list` is read-locked.
+    /// Queries of a read-locked list for a number of neighbours, from a thread without the GIL.
     pub fn questions<'a>(
         &self,
         list: &'a VoxelList,
@@ -113,7 +112,7 @@ impl SharedList {
         }
     }
 
-    /// A copy from a thread without the GIL.
+    /// Copies the list, from a thread without the GIL.
     pub fn copied(&self) -> PyResult<MapContents> {
         self.read_away(|list| on_pool(|| MapContents::from_list(list)))
     }

@@ -1,4 +1,4 @@
-//! The threads that calls share, and the signals that are handled while they work.
+//! Shared threads of calls, and signal handling while they work.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -12,13 +12,13 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Time between two looks for signals, well below a second.
+/// Time between two checks for signals, well below a second.
 pub const PATIENCE: Duration = Duration::from_millis(50);
 
-/// The pool of this process. A forked child has none of its parent's threads, so it makes its own.
+/// Thread pool of this process; a forked child creates its own.
 static POOL: Mutex<Option<(u32, &'static ThreadPool)>> = Mutex::new(None);
 
-/// Runs on the pool of this process, which has `RAYON_NUM_THREADS` threads or one for each core.
+/// Runs on the pool of this process, with `RAYON_NUM_THREADS` threads or one per core.
 pub fn on_pool<T: Send>(run: impl FnOnce() -> T + Send) -> PyResult<T> {
     let pool = {
         let mut known = POOL.lock();
@@ -47,14 +47,14 @@ fn pool_of(threads: usize) -> PyResult<ThreadPool> {
     pool.map_err(|error| PyRuntimeError::new_err(format!("no threads: {error}")))
 }
 
-/// Runs a part of a call, of well below a second, without the GIL, then the handlers of signals.
+/// Runs a part of a call, well below a second, without the GIL, then the signal handlers.
 pub fn step<T: Send>(py: Python<'_>, run: impl FnOnce() -> T + Send) -> PyResult<T> {
     let answer = py.detach(|| on_pool(run))?;
     py.check_signals()?;
     Ok(answer)
 }
 
-/// Set when the call that waits for the work was interrupted.
+/// Set when the waiting call was interrupted.
 #[derive(Clone, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
@@ -73,8 +73,9 @@ impl Progress for Stop {
     }
 }
 
-/// Runs a call that cannot be cut into parts on a thread of its own, without the GIL, and the handlers of signals
-/// meanwhile. When one raises, the work is left to itself: it owns its data, and ends where it looks at `Stop`.
+/// Runs an indivisible call on its own thread without the GIL, and the signal handlers meanwhile.
+///
+/// If a handler raises, the work is detached: it owns its data, and ends where it checks `Stop`.
 pub fn background<T: Send + 'static>(
     py: Python<'_>,
     run: impl FnOnce(&Stop) -> T + Send + 'static,
@@ -83,7 +84,7 @@ pub fn background<T: Send + 'static>(
     let (send, receive) = sync_channel(1);
     let of_work = stop.clone();
     let thread = std::thread::Builder::new().spawn(move || {
-        // Nobody receives the answer of a call that was interrupted.
+        // The result of an interrupted call is dropped.
         let _ = send.send(run(&of_work));
     });
     thread.map_err(|error| PyRuntimeError::new_err(format!("no thread: {error}")))?;
@@ -91,7 +92,7 @@ pub fn background<T: Send + 'static>(
 }
 
 fn wait<T: Send>(py: Python<'_>, stop: &Stop, receive: Receiver<T>) -> PyResult<T> {
-    // The receiver is not shared, but only what may be goes where the GIL is not held.
+    // The receiver is not `Sync`, but only such values may be used without the GIL.
     let receive = Mutex::new(receive);
     loop {
         match py.detach(|| receive.lock().recv_timeout(PATIENCE)) {
@@ -109,7 +110,7 @@ fn wait<T: Send>(py: Python<'_>, stop: &Stop, receive: Receiver<T>) -> PyResult<
     }
 }
 
-/// [`background`] for work that borrows, and that ends soon once `Stop` is set: it is waited for.
+/// [`background`] for work that borrows and ends soon after `Stop` is set: the call waits for it.
 pub fn watched<T: Send>(py: Python<'_>, run: impl FnOnce(&Stop) -> T + Send) -> PyResult<T> {
     let stop = Stop::default();
     let (send, receive) = sync_channel(1);

@@ -1,17 +1,17 @@
-//! Errors of clouds.
+//! Errors of cloud layouts and times.
 
 use thiserror::Error;
 
-/// A cloud whose layout or times cannot be read.
+/// Reason that the layout or the times of a cloud cannot be read.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum CloudError {
     /// More points than the limit.
     #[error(
-        "cloud of {points} points is over the limit of {max_points}; raise the limit if it is real"
+        "cloud has {points} points, above the limit of {max_points}; raise the limit if that is correct"
     )]
     TooManyPoints { points: u64, max_points: usize },
-    /// Points of no bytes.
+    /// Points without bytes.
     #[error("point_step is 0 but the cloud has {points} points")]
     PointStep { points: u64 },
     /// A row is shorter than its points.
@@ -32,47 +32,47 @@ pub enum CloudError {
         row_step: u32,
         needed: u64,
     },
-    /// More fields than any sensor has.
-    #[error("cloud declares {fields} fields, more than {max_fields}")]
+    /// More fields than the limit.
+    #[error("cloud declares {fields} fields, above {max_fields}")]
     TooManyFields { fields: usize, max_fields: usize },
     /// A datatype code that PointField does not define.
     #[error(
         "field '{field}' has datatype {datatype}, not one of 1 to 11 (INT8 to FLOAT64; INT64, UINT64, BOOL)"
     )]
     UnknownDatatype { field: String, datatype: u8 },
-    /// A field of no elements.
+    /// Field without elements.
     #[error("field '{field}' has count 0, a scalar has 1")]
     CountZero { field: String },
-    /// A field that ends beyond its point.
+    /// Field that ends beyond its point.
     #[error("field '{field}' ends at byte {end} of a point of {point_step} bytes")]
     BeyondPoint {
         field: String,
         end: u64,
         point_step: u32,
     },
-    /// Two fields of one name.
+    /// Duplicate field name.
     #[error("field '{field}' is declared twice")]
     Duplicate { field: String },
-    /// A coordinate is not there.
+    /// Missing coordinate.
     #[error("cloud has no field '{field}'; its fields are {present}")]
     MissingField {
         field: &'static str,
         present: String,
     },
-    /// A coordinate is an array.
+    /// Coordinate that is an array.
     #[error("field '{field}' has count {count}, a coordinate has 1")]
     CoordinateCount { field: &'static str, count: u32 },
-    /// The coordinates are integers, or of different types.
+    /// Coordinates of integer or mixed types.
     #[error("x, y, z are {x}, {y}, {z}; they must be all FLOAT32 or all FLOAT64")]
     CoordinateTypes {
         x: &'static str,
         y: &'static str,
         z: &'static str,
     },
-    /// The time field asked for is not there.
+    /// Missing time field named by an option.
     #[error("cloud has no time field '{field}'; its fields are {present}: correct `time.field`")]
     MissingTimeField { field: String, present: String },
-    /// The time field asked for has a type whose unit cannot be guessed.
+    /// Time field of a type with an unknown unit.
     #[error(
         "time field '{field}' is {datatype}[{count}], whose unit is not known: set `time.unit` for a scalar, or another `time.field`"
     )]
@@ -81,7 +81,7 @@ pub enum CloudError {
         datatype: &'static str,
         count: u32,
     },
-    /// The times of one cloud spread too far.
+    /// Times of one cloud that span too much.
     #[error(
         "times of field '{field}' read as {unit} span {span_s} s, not within 0..{max_span_s} s (`time.max_span_s`){}",
         other_unit(fitting)
@@ -93,7 +93,7 @@ pub enum CloudError {
         max_span_s: f64,
         fitting: Option<FittingUnit>,
     },
-    /// Offsets that lead too far from the stamp.
+    /// Time offsets too far from the stamp.
     #[error(
         "times of field '{field}' read as {unit} from the stamp reach {offset_s} s, over {max_span_s} s (`time.max_span_s`): set `time.reference` to stamp_start or stamp_end if they count from another instant{}",
         other_unit(fitting)
@@ -105,7 +105,7 @@ pub enum CloudError {
         max_span_s: f64,
         fitting: Option<FittingUnit>,
     },
-    /// Absolute times of another clock than the stamp's.
+    /// Absolute times of another clock than that of the stamp.
     #[error(
         "times of field '{field}' read as absolute {unit} are {distance_s} s from the stamp: synchronise the sensor (37 s is TAI, 18 s is GPS time), or set `time.reference` to stamp_start or stamp_end, or to absolute to insist"
     )]
@@ -116,7 +116,7 @@ pub enum CloudError {
     },
 }
 
-/// A unit in which times would make a cloud of plausible duration.
+/// Unit in which the times span a plausible duration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FittingUnit {
     /// Value for `time.unit`.

@@ -1,38 +1,39 @@
-//! Layout of a sensor's points, and the checks that make it safe to read.
+//! Layout of the points of a cloud, and its validation.
 
 use super::view::Coordinates;
 use super::{CloudError, CloudView};
 
 pub(super) const MAX_FIELDS: usize = 256;
-/// Longest part of a foreign name, and most names, repeated in an error.
+/// Maximum length of a name repeated in an error.
 const SHOWN_CHARS: usize = 48;
+/// Maximum number of names repeated in an error.
 const SHOWN_FIELDS: usize = 24;
 
-/// One field of a point, as `sensor_msgs/PointField`.
+/// Field of a point, as `sensor_msgs/PointField`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PointField {
     /// Name.
     pub name: String,
-    /// First byte of the field in its point.
+    /// Offset of the field in its point, bytes.
     pub offset: u32,
-    /// Code of the type, 1 to 11.
+    /// Type code, 1 to 11.
     pub datatype: u8,
     /// Elements.
     pub count: u32,
 }
 
-/// Packing of a cloud, as `sensor_msgs/PointCloud2`.
+/// Memory layout of a cloud, as `sensor_msgs/PointCloud2`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CloudLayout {
-    /// Points of a row.
+    /// Points per row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Bytes from point to point.
+    /// Bytes per point.
     pub point_step: u32,
-    /// Bytes from row to row.
+    /// Bytes per row.
     pub row_step: u32,
-    /// True if the most significant byte comes first.
+    /// True for big-endian data.
     pub is_bigendian: bool,
     /// Fields of a point.
     pub fields: Vec<PointField>,
@@ -41,7 +42,7 @@ pub struct CloudLayout {
 /// Limits of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CloudLimits {
-    /// Points of one cloud.
+    /// Maximum number of points.
     pub max_points: usize,
 }
 
@@ -119,10 +120,10 @@ impl Datatype {
 }
 
 impl CloudLayout {
-    /// Checks the whole layout against `data`, then gives access to the points.
+    /// Validates the layout against `data` and gives access to the points.
     ///
-    /// Bytes after the last row are ignored. A cloud of no points is taken with whatever
-    /// fields, since drivers send it bare.
+    /// Bytes after the last row are ignored. A cloud without points is accepted with any fields, since drivers send
+    /// it without them.
     pub fn view<'a>(
         &'a self,
         data: &'a [u8],
@@ -238,12 +239,12 @@ impl CloudLayout {
     }
 }
 
-/// A foreign name, cut to a length fit for a log.
+/// Name from outside, truncated for a log.
 pub(super) fn shown(name: &str) -> String {
     name.chars().take(SHOWN_CHARS).collect()
 }
 
-/// Names of the fields, fit for a log.
+/// Names of the fields, truncated for a log.
 pub(super) fn names(fields: &[PointField]) -> String {
     let mut names: Vec<String> = fields
         .iter()

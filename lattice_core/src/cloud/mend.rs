@@ -1,33 +1,33 @@
-//! Layouts that drivers declare wrongly, read as their data allow.
+//! Repair of layouts that drivers declare wrongly.
 
 use std::fmt;
 
 use super::layout::{MAX_FIELDS, shown};
 use super::{CloudError, CloudLayout, Datatype, PointField};
 
-/// Part of a layout that was ignored or read otherwise than declared.
+/// Repair of a layout: what was ignored or changed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LayoutNote {
-    /// A field that cannot be read; the cloud is read without it.
+    /// Unreadable field, ignored.
     FieldIgnored(CloudError),
-    /// A scalar of count 0, as PCL pads its points; read as one element.
+    /// Scalar of count 0, as PCL declares padding; read as one element.
     CountZero {
         /// Name of the field.
         field: String,
     },
-    /// Rows follow each other without padding, whatever `row_step` says.
+    /// Rows without padding, although `row_step` declares some.
     RowStep {
-        /// As declared.
+        /// Declared value.
         row_step: u32,
-        /// As read.
+        /// Value used.
         used: u32,
     },
-    /// One row in place of none.
+    /// Height 0, read as 1.
     HeightZero {
         /// Points of the row.
         points: u32,
     },
-    /// Data of a cloud that declares no points.
+    /// Data in a cloud that declares no points.
     DataWithoutPoints {
         /// Points of a row, as declared.
         width: u32,
@@ -63,9 +63,9 @@ impl fmt::Display for LayoutNote {
 }
 
 impl CloudLayout {
-    /// Changes the layout to what `bytes` bytes of data allow to read without a doubt, and gives what was changed.
+    /// Repairs the layout as far as `bytes` bytes of data determine it, and returns the changes.
     ///
-    /// Coordinates are never ignored: where they cannot be read, [`CloudLayout::view`] says why.
+    /// Coordinates are never ignored: if they are unreadable, [`CloudLayout::view`] fails.
     pub fn mend(&mut self, bytes: usize) -> Vec<LayoutNote> {
         let mut notes = Vec::new();
         if self.fields.len() <= MAX_FIELDS {
@@ -143,7 +143,7 @@ impl CloudLayout {
 }
 
 impl PointField {
-    /// Reason for which the field cannot be read from a point of `point_step` bytes.
+    /// Reason that the field cannot be read from a point of `point_step` bytes.
     pub(super) fn problem(&self, point_step: u32) -> Option<CloudError> {
         let field = || shown(&self.name);
         let Some(datatype) = Datatype::from_code(self.datatype) else {

@@ -1,9 +1,8 @@
-//! Point clouds: field access for any layout, per-point time, deskew.
+//! Point clouds: field access for any layout, per-point time, deskewing.
 //!
-//! A [`CloudLayout`] says how a sensor packs its points; [`CloudLayout::view`] checks every
-//! one of its numbers against the data once, after which a [`CloudView`] reads points
-//! without trusting anything. [`transform_records`] brings them into the map, each with the
-//! pose of its own time.
+//! A [`CloudLayout`] describes the memory layout. [`CloudLayout::view`] validates it against the data once; the
+//! resulting [`CloudView`] reads points safely. [`transform_records`] transforms them to the map frame, each with the
+//! pose at its own time.
 
 mod error;
 mod layout;

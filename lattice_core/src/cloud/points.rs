@@ -1,11 +1,11 @@
-//! A cloud in the map frame: an exact datum and short offsets.
+//! Point cloud in the map frame: an exact datum and short offsets.
 
 use nalgebra::Vector3;
 
-/// Points in the map frame (ENU, metres), all of one stamp.
+/// Points in the map frame (ENU, metres) with one stamp.
 ///
-/// A point is `datum_m + offset`: the datum carries the magnitude in f64, so that the
-/// offsets keep millimetres in f32 however far the map origin is.
+/// A point is `datum_m + offset`. The datum is in f64, so that offsets in f32 keep millimetres far from the map
+/// origin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cloud {
     /// Time of the cloud, nanoseconds since the Unix epoch.
@@ -38,7 +38,7 @@ impl Cloud {
         self.offsets_m.len()
     }
 
-    /// True if there is no point.
+    /// Tests whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.offsets_m.is_empty()
     }

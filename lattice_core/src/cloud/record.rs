@@ -4,24 +4,23 @@ use nalgebra::Vector3;
 
 use super::{CloudView, Datatype, PointField};
 
-/// Names of the fields of a viewpoint: the position of the sensor when it measured the point, in the frame of the
-/// cloud.
+/// Field names of the viewpoint: the position of the sensor when it measured the point, in the frame of the cloud.
 pub const VIEWPOINT_FIELDS: [&str; 3] = ["vp_x", "vp_y", "vp_z"];
 
-/// Coordinates below this are rounded by less than 0.5 mm in single precision, m.
+/// Coordinate below which single precision rounds by less than 0.5 mm, metres.
 const SINGLE_REACH_M: f64 = 16_384.0;
 
 /// Type of coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
-    /// 12 bytes a point; 4 um at 64 m from the map origin, 4 mm at 64 km.
+    /// `f32`, 12 bytes per point; rounds by 4 um at 64 m from the map origin, 4 mm at 64 km.
     Float32,
-    /// 24 bytes a point; exact anywhere, but RViz does not draw it.
+    /// `f64`, 24 bytes per point; exact anywhere, but RViz does not display it.
     Float64,
 }
 
 impl Precision {
-    /// Single precision where it rounds a point by less than 0.5 mm, else double.
+    /// Single precision if it rounds a point by less than 0.5 mm, else double.
     #[inline]
     pub fn for_point(point_m: &Vector3<f64>) -> Self {
         Self::of(!point_m.iter().all(|v| v.abs() < SINGLE_REACH_M))
@@ -44,19 +43,20 @@ impl Precision {
     }
 }
 
-/// Contents of a record, in this order and little endian, without padding: `x y z`, the copied fields, and where asked
-/// for `vp_x vp_y vp_z`.
+/// Layout of a record, little endian and without padding: `x y z`, the copied fields, and optionally
+/// `vp_x vp_y vp_z`.
 #[derive(Clone, Debug)]
 pub struct RecordFormat {
-    /// Fields of the cloud.
+    /// Copied fields of the cloud.
     pub(super) copied: Vec<PointField>,
     pub(super) precision: Option<Precision>,
     pub(super) with_viewpoints: bool,
 }
 
 impl RecordFormat {
-    /// Format for a cloud, with copies of those of its fields that are named. Coordinates are of `precision`; `None`:
-    /// single precision unless it rounds a point by 0.5 mm or more.
+    /// Creates the format for a cloud, with copies of its fields in the given list.
+    ///
+    /// Coordinates have `precision`; `None` selects single precision unless it rounds a point by 0.5 mm or more.
     pub fn new(
         view: &CloudView<'_>,
         names: &[String],
@@ -75,7 +75,7 @@ impl RecordFormat {
         }
     }
 
-    /// Fields of a record with their offsets, and its bytes.
+    /// Fields of a record with their offsets, and the size of a record in bytes.
     pub fn fields(&self, precision: Precision) -> (Vec<PointField>, usize) {
         let of_precision = |name: &str| PointField {
             name: name.to_owned(),
@@ -98,9 +98,9 @@ impl RecordFormat {
     }
 }
 
-/// Copies fields from a record of a cloud to a record in little endian.
+/// Copy of fields from a cloud record to a little-endian record.
 pub(super) struct Copies {
-    /// Range of bytes in the source, and the width of its elements.
+    /// Byte range in the source, and the width of the elements.
     parts: Vec<(std::ops::Range<usize>, usize)>,
     is_big_endian: bool,
 }
@@ -119,7 +119,7 @@ impl Copies {
         }
     }
 
-    /// Writes the fields of a source record one behind the other to the start of `out` and gives what follows.
+    /// Writes the fields of a source record to the start of `out`; returns the remainder.
     #[inline]
     pub fn write<'a>(&self, record: &[u8], mut out: &'a mut [u8]) -> &'a mut [u8] {
         for (source, width) in &self.parts {
@@ -139,7 +139,7 @@ impl Copies {
     }
 }
 
-/// Writes three coordinates to the start of `out` and gives what follows.
+/// Writes three coordinates to the start of `out`; returns the remainder.
 #[inline]
 pub(super) fn write_vector<'a, const IS_WIDE: bool>(
     v: &Vector3<f64>,

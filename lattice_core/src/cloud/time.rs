@@ -1,4 +1,4 @@
-//! Time of each point: field, unit and the instant that it counts from.
+//! Time of each point: field, unit and reference.
 
 use rayon::prelude::*;
 
@@ -7,74 +7,78 @@ use super::layout::shown;
 use super::time_field::{TimeField, candidates};
 use super::{CloudError, CloudView, Datatype, PointField, TimeOptions, TimeReference, TimeUnit};
 
-/// Time of a point that has none.
+/// Time of a point without one.
 pub const NO_TIME_NS: i64 = i64::MIN;
 
-/// Points of one task, at least.
+/// Minimum number of points per task.
 const MIN_TASK: usize = 8192;
-/// An absolute time further from the stamp is of another clock.
+/// Distance from the stamp above which an absolute time is from another clock.
 const MAX_CLOCK_DISTANCE_S: f64 = 10.0;
-/// Shortest sweep of a sensor that is proposed with another unit, s.
+/// Minimum duration of a sweep for the proposal of another unit, seconds.
 const SHORTEST_SWEEP_S: f64 = 1.0e-3;
 
-/// Times of the points of a cloud, and what they were taken from.
+/// Times of the points of a cloud, with their source.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointTimes<'a> {
-    /// Nanoseconds since the Unix epoch of each point, [`NO_TIME_NS`] where it has none; `None` if no
-    /// point has a time of its own.
+    /// Time of each point in nanoseconds since the Unix epoch, or [`NO_TIME_NS`]; `None` if no point has a time of
+    /// its own.
     pub times_ns: Option<Vec<i64>>,
-    /// Origin of the times.
+    /// Source of the times.
     pub source: TimeSource<'a>,
 }
 
-/// Origin of the times of a cloud's points.
+/// Source of the times of a cloud's points.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TimeSource<'a> {
-    /// The cloud has no return, or times were not asked for.
+    /// No returns in the cloud, or times disabled.
     Nothing,
-    /// No field has a name and type known for times.
+    /// No field with a known name and type.
     NoField {
-        /// Names of the fields that may be times, for a log; empty if none may.
+        /// Names of possible time fields, for a log; empty if there are none.
         candidates: String,
     },
-    /// No return has a finite value.
+    /// No return with a finite time.
     NotFinite {
-        /// The field of times.
+        /// Time field.
         field: &'a PointField,
     },
-    /// A field.
+    /// Times from a field.
     Field {
-        /// The field of times.
+        /// Time field.
         field: &'a PointField,
-        /// Its unit.
+        /// Unit of the field.
         unit: TimeUnit,
-        /// Instant that it counts from.
+        /// Reference of the times.
         reference: TimeReference,
-        /// Time between the earliest and the latest return, nanoseconds.
+        /// Duration between the earliest and the latest return, nanoseconds.
         span_ns: i64,
     },
 }
 
-/// Conversion of values of a field into times.
+/// Conversion of field values to times.
 struct Clock<'a> {
     field: &'a PointField,
     unit: TimeUnit,
     reference: TimeReference,
-    /// Nanoseconds since the epoch of the value zero.
+    /// Time of the value zero, nanoseconds since the epoch.
     zero_ns: i64,
-    /// Earliest and latest nanoseconds of the field.
+    /// Earliest and latest time of the field, nanoseconds.
     range_ns: (i64, i64),
 }
 
 impl<'a> CloudView<'a> {
-    /// Time of every point, and its origin.
+    /// Determines the time of every point.
     ///
-    /// Without options, fields named `time`, `t`, `timestamp` and the like count as f32 in seconds from
-    /// the stamp, as 32-bit integers in nanoseconds from the stamp, and with 64 bits in seconds (f64) or
-    /// nanoseconds from the stamp or, by their size, in s, ms, us or ns from the epoch; a name that ends
-    /// in `_s`, `_ms`, `_us` or `_ns` states the unit. Points that are not finite or lie in the sensor's
-    /// origin are no returns: their times do not enter the checks, and count as none where they leave the
-    /// range of the others, as do times apart from those of most returns.
+    /// Without options, the field is one named `time`, `t`, `timestamp` or similar:
+    /// - `f32`: seconds from the stamp
+    /// - 32-bit integer: nanoseconds from the stamp
+    /// - `f64`: seconds; 64-bit integer: nanoseconds; from the stamp, or, by their magnitude, s, ms, us or ns from
+    ///   the epoch
+    /// - a suffix `_s`, `_ms`, `_us` or `_ns` states the unit
+    ///
+    /// Points that are not finite or lie in the origin of the sensor are not returns. Their times are ignored by the
+    /// checks. They have no time if it is outside the range of the others, as do times apart from those of most
+    /// returns.
     pub fn point_times(
         &self,
         stamp_ns: i64,
@@ -135,14 +139,14 @@ impl<'a> CloudView<'a> {
         let Err(error) = all else {
             return all.map(Some);
         };
-        // Perhaps a few are absurd.
+        // A few values may be outliers.
         let most = self.range_of_most(field, options);
         let clock = most
             .and_then(|(range, middle)| Clock::new(field, range, middle, stamp_ns, options).ok());
         clock.map(Some).ok_or(error)
     }
 
-    /// Gives the value of `field` in a record; NaN if it is not there.
+    /// Reader of `field` in a record; NaN if it is missing.
     fn scalars(&self, field: &PointField) -> impl Fn(&[u8]) -> f64 + Sync {
         let datatype = Datatype::from_code(field.datatype).filter(|_| field.count > 0);
         let offset = field.offset as usize;
@@ -153,7 +157,7 @@ impl<'a> CloudView<'a> {
         }
     }
 
-    /// Least and greatest value of `field` over the returns; `None` if there are none.
+    /// Minimum and maximum of `field` over the returns; `None` if there are none.
     fn value_range(&self, field: &PointField) -> Option<(f64, f64)> {
         let value_of = self.scalars(field);
         (0..self.len())
@@ -167,8 +171,8 @@ impl<'a> CloudView<'a> {
             .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
-    /// Range of the values of `field` within the longest duration of a cloud of their median, and the
-    /// median; `None` unless most returns lie there.
+    /// Range of the values of `field` within the maximum duration about their median, and the median; `None` unless
+    /// it contains most returns.
     fn range_of_most(
         &self,
         field: &TimeField<'a>,
@@ -193,7 +197,7 @@ impl<'a> CloudView<'a> {
 }
 
 impl<'a> Clock<'a> {
-    /// Conversion of the values of a field from `range.0` to `range.1`; `value` is one of them.
+    /// Creates the conversion for values from `range.0` to `range.1`; `value` is one of them.
     fn new(
         field: &TimeField<'a>,
         range: (f64, f64),
@@ -262,7 +266,7 @@ impl<'a> Clock<'a> {
     }
 }
 
-/// The coarsest unit other than `unit` in which a difference of values is a sweep.
+/// Coarsest unit other than `unit` in which `span` is a plausible duration.
 pub(super) fn fitting_unit(span: f64, unit: TimeUnit, max_span_s: f64) -> Option<FittingUnit> {
     let spans = TimeUnit::ALL.into_iter().filter(|u| *u != unit);
     let mut spans = spans.map(|unit| FittingUnit {
@@ -272,18 +276,18 @@ pub(super) fn fitting_unit(span: f64, unit: TimeUnit, max_span_s: f64) -> Option
     spans.find(|fitting| (SHORTEST_SWEEP_S..max_span_s).contains(&fitting.span_s))
 }
 
-/// True for a point that a sensor measured: finite, and not in its own origin.
+/// Tests whether a point is a return: finite and not in the origin of the sensor.
 fn is_return(p: &nalgebra::Vector3<f64>) -> bool {
     p.iter().all(|v| v.is_finite()) && p.iter().any(|v| *v != 0.0)
 }
 
-/// Nanoseconds of `value` units, rounded; saturating, `None` if not finite.
+/// Converts to nanoseconds, rounded and saturating; `None` if not finite.
 fn to_ns(value: f64, unit: TimeUnit) -> Option<i64> {
     if !value.is_finite() {
         return None;
     }
     let scale = unit.scale_ns();
-    // Conversions truncate and saturate; without SSE4.1 `trunc` and `round` are calls.
+    // Casts truncate and saturate; without SSE4.1 `trunc` and `round` are function calls.
     let whole = value as i64;
     let rest = (value - whole as f64) * scale as f64;
     let rest_ns = rest as i64;

@@ -1,9 +1,9 @@
-//! Choice of the field that is a cloud's time, and of its unit.
+//! Detection of the time field of a cloud and of its unit.
 
 use super::layout::{names, shown};
 use super::{CloudError, CloudView, Datatype, PointField, TimeOptions, TimeReference, TimeUnit};
 
-/// Names that sensors give their time, with or without a unit behind them; the first one present wins.
+/// Field names of times, with an optional unit suffix; the first present one wins.
 const NAMES: [&str; 9] = [
     "time",
     "t",
@@ -15,14 +15,14 @@ const NAMES: [&str; 9] = [
     "stamp",
     "stamps",
 ];
-/// Endings of names that state a unit.
+/// Name suffixes that state a unit.
 const UNITS: [(&str, TimeUnit); 4] = [
     ("_ns", TimeUnit::Nanoseconds),
     ("_us", TimeUnit::Microseconds),
     ("_ms", TimeUnit::Milliseconds),
     ("_s", TimeUnit::Seconds),
 ];
-/// Names of fields that are no time.
+/// Field names that are not times.
 const NOT_TIMES: [&str; 34] = [
     "x",
     "y",
@@ -59,7 +59,7 @@ const NOT_TIMES: [&str; 34] = [
     "confidence",
     "id",
 ];
-/// Least values of 64 bits taken as absolute: 1973 in seconds, milli-, micro- and nanoseconds.
+/// Minimum 64-bit values taken as absolute: the year 1973 in seconds, milli-, micro- and nanoseconds.
 const LEAST_ABSOLUTE: [(f64, TimeUnit); 4] = [
     (1.0e17, TimeUnit::Nanoseconds),
     (1.0e14, TimeUnit::Microseconds),
@@ -67,7 +67,7 @@ const LEAST_ABSOLUTE: [(f64, TimeUnit); 4] = [
     (1.0e8, TimeUnit::Seconds),
 ];
 
-/// A field of times, with the unit that its name or an option states.
+/// Time field with the unit stated by its name or an option.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TimeField<'a> {
     pub field: &'a PointField,
@@ -76,7 +76,7 @@ pub(super) struct TimeField<'a> {
 }
 
 impl<'a> TimeField<'a> {
-    /// The field asked for, else the first one of a known name and type; `None` if there is none.
+    /// Selects the field named by the options, else the first one of a known name and type; `None` if there is none.
     pub fn of(view: &CloudView<'a>, options: &TimeOptions) -> Result<Option<Self>, CloudError> {
         let fields = view.fields();
         match options.field.as_deref() {
@@ -102,7 +102,7 @@ impl<'a> TimeField<'a> {
         }
     }
 
-    /// Unit and reference: as stated, else as type and size suggest. `value` is one of the field's.
+    /// Unit and reference as stated, else inferred from type and magnitude. `value` is one of the field's.
     pub fn guess(
         &self,
         value: f64,
@@ -142,7 +142,7 @@ impl<'a> TimeField<'a> {
         })
     }
 
-    /// True for the types in which times of a sweep, or of an epoch, have room.
+    /// Tests whether the type has the range of times of a sweep or of an epoch.
     fn has_usual_type(&self) -> bool {
         matches!(
             self.datatype,
@@ -156,7 +156,7 @@ impl<'a> TimeField<'a> {
     }
 }
 
-/// Names of the fields that may be times, fit for a log; empty if none may.
+/// Names of possible time fields, for a log; empty if there are none.
 pub(super) fn candidates(fields: &[PointField]) -> String {
     let may_be = |field: &&PointField| {
         let name = field.name.to_ascii_lowercase();

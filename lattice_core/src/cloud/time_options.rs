@@ -1,4 +1,4 @@
-//! Settings for per-point time.
+//! Options of per-point time.
 
 /// Unit of a time field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,7 +14,7 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
-    /// All units, the coarsest first.
+    /// All units, coarsest first.
     pub const ALL: [TimeUnit; 4] = [
         TimeUnit::Seconds,
         TimeUnit::Milliseconds,
@@ -44,7 +44,7 @@ impl TimeUnit {
 }
 
 impl TimeReference {
-    /// Name as in the documentation of the variants.
+    /// Name in parameters.
     pub fn name(self) -> &'static str {
         match self {
             TimeReference::StampStart => "stamp_start",
@@ -54,28 +54,28 @@ impl TimeReference {
     }
 }
 
-/// Instant that a time field counts from.
+/// Reference of the times of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TimeReference {
-    /// `stamp_start`: from the stamp of the cloud, negative before it. Times of a free
-    /// running clock count from the earliest point, which then has the stamp.
+    /// `stamp_start`: times count from the stamp of the cloud and may be negative. Times of a free-running clock
+    /// count from the earliest point, which has the stamp.
     StampStart,
     /// `stamp_end`: the latest point has the stamp of the cloud.
     StampEnd,
-    /// `absolute`: from the Unix epoch, whatever the stamp.
+    /// `absolute`: times count from the Unix epoch, independent of the stamp.
     Absolute,
 }
 
-/// Overrides of the detector; the default guesses all by name and type.
+/// Overrides of the detection; by default everything is inferred from name and type.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeOptions {
-    /// Name of the time field; empty to have no per-point time.
+    /// Name of the time field; empty disables per-point time.
     pub field: Option<String>,
-    /// Its unit.
+    /// Unit of the time field.
     pub unit: Option<TimeUnit>,
-    /// Instant that it counts from.
+    /// Reference of the times.
     pub reference: Option<TimeReference>,
-    /// The times of a cloud span less than this, seconds.
+    /// Maximum duration of a cloud, seconds.
     pub max_span_s: f64,
 }
 

@@ -1,4 +1,5 @@
-//! Deskew: every point into the map with the pose of its own time, from record to record in one pass.
+//! Deskewing: transforms every point to the map frame with the pose at its own time, from record to record in one
+//! pass.
 
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
@@ -6,22 +7,23 @@ use rayon::prelude::*;
 use super::record::{Copies, Precision, RecordFormat, write_vector};
 use super::{CloudView, NO_TIME_NS};
 
-/// Points of one task, at least, and tasks of one thread: enough to share the work evenly.
+/// Minimum number of points per task.
 const MIN_CHUNK: usize = 2048;
+/// Tasks per thread, for an even distribution.
 const CHUNKS_PER_THREAD: usize = 4;
-/// Times remembered while looking for equal ones, as a power of two: many more than the
-/// columns of a spinning laser.
+/// Size of the table of repeated times, as a power of two: far more than the columns of a spinning lidar.
 const MEMO_BITS: u32 = 15;
 /// Slot of a point without a time.
 const NO_SLOT: u32 = u32::MAX;
 
-/// Distances kept, in the sensor frame: `min_range_m < distance <= max_range_m`, so that
-/// the sensor's origin, which many drivers send for no return, is never kept.
+/// Range limits in the sensor frame: `min_range_m < distance <= max_range_m`.
+///
+/// The origin of the sensor, which many drivers send for a missing return, is always dropped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RangeLimits {
-    /// Greatest distance too short, metres.
+    /// Distance up to which points are dropped, metres.
     pub min_range_m: f64,
-    /// Greatest distance kept, metres.
+    /// Maximum distance, metres.
     pub max_range_m: f64,
 }
 
@@ -34,10 +36,10 @@ impl Default for RangeLimits {
     }
 }
 
-/// Records of the points in the map, in the order of the cloud, and the numbers of those left out.
+/// Transformed records in the order of the cloud, and the numbers of dropped points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Records {
-    /// Records as [`RecordFormat::fields`] lays them out, coordinates in the map frame in metres.
+    /// Records as laid out by [`RecordFormat::fields`], coordinates in the map frame in metres.
     pub data: Vec<u8>,
     /// Number of records.
     pub points: usize,
@@ -45,19 +47,18 @@ pub struct Records {
     pub precision: Precision,
     /// Points with a NaN or infinite coordinate.
     pub not_finite: usize,
-    /// Finite points nearer or further than the limits.
+    /// Finite points outside the range limits.
     pub out_of_range: usize,
-    /// Points within range that have no time.
+    /// Points in range without a time.
     pub no_time: usize,
 }
 
-/// Brings the points of `view` into the map: point `i` by `map_from_sensor(times[i])`, or
-/// all by `map_from_sensor(stamp_ns)` where `times` is `None`. Points without a time there
-/// are left out and counted.
+/// Transforms the points of `view` to the map: point `i` by `map_from_sensor(times[i])`, or all by
+/// `map_from_sensor(stamp_ns)` if `times` is `None`.
 ///
-/// Runs on rayon; the order and the bits of the result do not depend on the number of
-/// threads. Poses of times that come again are looked up once. Fails as a whole with the
-/// error of the first point kept, in order, whose pose is missing.
+/// Points without a time are dropped and counted if there are times. The order and the bits of the result do not
+/// depend on the number of rayon threads. Poses of repeated times are looked up once. Fails with the error of the
+/// first kept point whose pose is missing.
 pub fn transform_records<E: Send>(
     view: &CloudView<'_>,
     stamp_ns: i64,
@@ -87,7 +88,7 @@ pub fn transform_records<E: Send>(
     }
 }
 
-/// A cloud to transform. `lookup` gives the pose of a point, `None` where it has no time.
+/// Cloud to be transformed. `lookup` returns the pose of a point, `None` without a time.
 struct Source<'a, L> {
     view: &'a CloudView<'a>,
     range: &'a RangeLimits,
@@ -96,14 +97,14 @@ struct Source<'a, L> {
     lookup: L,
 }
 
-/// Numbers of the points of a part, by what became of them.
+/// Numbers of the points of a part by outcome.
 #[derive(Default)]
 struct Counts {
     kept: usize,
     not_finite: usize,
     out_of_range: usize,
     no_time: usize,
-    /// True if a point needs double precision.
+    /// True if a point requires double precision.
     is_far: bool,
 }
 
@@ -111,7 +112,7 @@ impl<'a, E: Send, L> Source<'a, L>
 where
     L: Fn(usize) -> Result<Option<Isometry3<f64>>, E> + Sync,
 {
-    /// `known` gives poses that were looked up before.
+    /// Transforms the points; `known` returns poses looked up before.
     fn records<'p>(
         &self,
         format: &RecordFormat,
@@ -127,7 +128,7 @@ where
         if let Some(precision) = format.precision {
             return write(precision).map(|(records, _)| records);
         }
-        // The position of the sensor foretells in all but rare clouds whether some point needs double precision.
+        // The position of the sensor nearly always predicts whether some point requires double precision.
         let pose = known(0)
             .copied()
             .or_else(|| (self.lookup)(0).ok().flatten());
@@ -140,7 +141,7 @@ where
         write(needed).map(|(records, _)| records)
     }
 
-    /// The records, of `bytes` bytes each, and the precision that their points need.
+    /// Records of `bytes` bytes each, and the precision that their points require.
     fn write<'p, const IS_WIDE: bool>(
         &self,
         bytes: usize,
@@ -155,7 +156,7 @@ where
         };
         let chunk = points.div_ceil(tasks).max(MIN_CHUNK);
         let mut data = vec![0; points.saturating_mul(bytes)];
-        // Collected before the first error is taken, so that it is the first in order.
+        // All results are collected first, so that the first error in order is returned.
         let parts: Vec<Result<Counts, E>> = data
             .par_chunks_mut(chunk.saturating_mul(bytes))
             .enumerate()
@@ -164,7 +165,7 @@ where
         let mut all = Counts::default();
         for (part, counts) in parts.into_iter().enumerate() {
             let counts = counts?;
-            // Records move up to those before them.
+            // Records are compacted.
             let first = part * chunk;
             if all.kept < first {
                 let from = first * bytes;
@@ -188,7 +189,7 @@ where
         Ok((records, Precision::of(all.is_far)))
     }
 
-    /// Writes the records of the points from `first` on to `out`, which has room for all of them.
+    /// Writes the records of the points from `first` on to `out`, which has space for all.
     fn write_part<'p, const IS_WIDE: bool>(
         &self,
         first: usize,
@@ -240,25 +241,24 @@ where
     }
 }
 
-/// Poses of the times that a cloud repeats: column by column, or row by row where the times
-/// of a row come again in the next.
+/// Poses of repeated times: per column, or per row if the times repeat in every row.
 struct Memo {
-    /// Number of the pose of each point.
+    /// Index of the pose of each point.
     slots: Vec<u32>,
-    /// Poses found; the misses are asked for again, to have their errors.
+    /// Poses found; failed lookups are repeated for their errors.
     poses: Vec<Option<Isometry3<f64>>>,
 }
 
 impl Memo {
-    /// `None` if the times hardly repeat.
+    /// Creates the table; `None` if times rarely repeat.
     fn new<E: Send>(
         times: &[i64],
         map_from_sensor: &(impl Fn(i64) -> Result<Isometry3<f64>, E> + Sync),
     ) -> Option<Memo> {
         let mut distinct_ns: Vec<i64> = Vec::new();
         let mut slots = Vec::with_capacity(times.len());
-        // Direct mapped: two times of one place displace each other and are merely asked
-        // for again, so that no choice of times makes it slow.
+        // Direct mapped: colliding times displace each other and are looked up again, so that no input degrades the
+        // time.
         let mut seen = vec![(NO_TIME_NS, 0_u32); 1 << MEMO_BITS];
         for &at_ns in times {
             if at_ns == NO_TIME_NS {

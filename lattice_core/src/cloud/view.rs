@@ -1,4 +1,4 @@
-//! Reading points from bytes that were checked.
+//! Reading points from validated bytes.
 
 use nalgebra::Vector3;
 
@@ -11,7 +11,7 @@ pub(super) struct Coordinates {
     pub wide: bool,
 }
 
-/// A checked cloud: points by index, row after row, without copying.
+/// View of a validated cloud: points by index, row by row, without copying.
 #[derive(Clone, Copy, Debug)]
 pub struct CloudView<'a> {
     data: &'a [u8],
@@ -41,7 +41,7 @@ impl<'a> CloudView<'a> {
         }
     }
 
-    /// View of `points` points, whose extent in `data` was checked.
+    /// Creates a view of `points` points with a validated extent.
     pub(super) fn new(
         layout: &'a CloudLayout,
         data: &'a [u8],
@@ -65,7 +65,7 @@ impl<'a> CloudView<'a> {
         self.points
     }
 
-    /// True if there is no point.
+    /// Tests whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.points == 0
     }
@@ -75,14 +75,13 @@ impl<'a> CloudView<'a> {
         self.fields
     }
 
-    /// Point `i` in the sensor frame, metres; NaN where the sensor says so, or where `i` is
-    /// not below [`CloudView::len`].
+    /// Point `i` in the sensor frame, metres; NaN for missing returns or if `i` is out of range.
     #[inline]
     pub fn xyz(&self, i: usize) -> Vector3<f64> {
         self.xyz_of(self.record(i))
     }
 
-    /// The bytes of point `i`; none if there is no such point.
+    /// Bytes of point `i`; empty if `i` is out of range.
     #[inline]
     pub(super) fn record(&self, i: usize) -> &'a [u8] {
         let start = self.point_start(i);
@@ -105,13 +104,13 @@ impl<'a> CloudView<'a> {
         self.big_endian
     }
 
-    /// First element of `field` of point `i`, widened; NaN if it is not there.
+    /// First element of `field` of point `i`, converted to `f64`; NaN if it is missing.
     #[inline]
     pub fn scalar(&self, field: &PointField, i: usize) -> f64 {
         self.element(field, i, 0)
     }
 
-    /// Element `n` of `field` of point `i`, widened; NaN if it is not there.
+    /// Element `n` of `field` of point `i`, converted to `f64`; NaN if it is missing.
     #[inline]
     pub fn element(&self, field: &PointField, i: usize, n: u32) -> f64 {
         let Some(datatype) = Datatype::from_code(field.datatype).filter(|_| n < field.count) else {
@@ -121,7 +120,7 @@ impl<'a> CloudView<'a> {
         self.number_of(self.record(i), datatype, offset)
     }
 
-    /// Number at an offset of a record, widened; NaN if it is not there.
+    /// Number at an offset of a record, converted to `f64`; NaN if it is missing.
     #[inline]
     pub(super) fn number_of(&self, record: &[u8], datatype: Datatype, offset: usize) -> f64 {
         let is_big = self.big_endian;
@@ -147,8 +146,8 @@ impl<'a> CloudView<'a> {
         }
     }
 
-    /// The first four bytes of `field` of point `i` as they are, as colours are packed into a float;
-    /// none if they are not there or belong to another field.
+    /// First four bytes of `field` of point `i`, for colours packed into a float; `None` if missing or of another
+    /// field.
     #[inline]
     pub fn packed(&self, field: &PointField, i: usize) -> Option<u32> {
         let width = Datatype::from_code(field.datatype)?.bytes();
@@ -160,7 +159,7 @@ impl<'a> CloudView<'a> {
         })
     }
 
-    /// First byte of point `i`, beyond the data if there is no such point.
+    /// Offset of point `i`; beyond the data if it is out of range.
     #[inline]
     fn point_start(&self, i: usize) -> usize {
         if i >= self.points {
@@ -173,7 +172,7 @@ impl<'a> CloudView<'a> {
     }
 }
 
-/// A number of `N` bytes at an offset of a record; NaN beyond it.
+/// Number of `N` bytes at an offset of a record; NaN beyond its end.
 #[inline]
 fn number<const N: usize>(record: &[u8], offset: usize, parse: impl Fn([u8; N]) -> f64) -> f64 {
     let bytes = record

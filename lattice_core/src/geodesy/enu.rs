@@ -1,10 +1,10 @@
-//! The local east-north-up frame at a fixed origin.
+//! Local east-north-up (ENU) frame at a fixed origin.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::{GeodesyError, Geodetic, ecef_from_geodetic, geodetic_from_ecef};
 
-/// East-north-up frame tangent to the ellipsoid at its origin, metres.
+/// ENU frame tangent to the ellipsoid at its origin, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnuFrame {
     origin: Geodetic,
@@ -13,7 +13,7 @@ pub struct EnuFrame {
 }
 
 impl EnuFrame {
-    /// Frame at `origin`.
+    /// Creates the frame at `origin`.
     pub fn new(origin: Geodetic) -> EnuFrame {
         EnuFrame {
             origin,
@@ -27,18 +27,18 @@ impl EnuFrame {
         &self.origin
     }
 
-    /// Position of a place in this frame, metres east, north and up.
+    /// ENU position of a geodetic place, metres.
     pub fn enu_from_geodetic(&self, place: &Geodetic) -> Vector3<f64> {
         self.ecef_from_enu
             .tr_mul(&(ecef_from_geodetic(place) - self.origin_ecef_m))
     }
 
-    /// Place of a position in this frame, metres; refused as by [`geodetic_from_ecef`].
+    /// Geodetic place of an ENU position, metres; fails as [`geodetic_from_ecef`].
     pub fn geodetic_from_enu(&self, enu_m: &Vector3<f64>) -> Result<Geodetic, GeodesyError> {
         geodetic_from_ecef(&(self.origin_ecef_m + self.ecef_from_enu * enu_m))
     }
 
-    /// Transform from this frame to ECEF, metres: `earth` from `map` of REP-105.
+    /// Transform from this frame to ECEF, metres: `earth` from `map` of REP 105.
     pub fn ecef_from_enu(&self) -> Isometry3<f64> {
         Isometry3::from_parts(
             Translation3::from(self.origin_ecef_m),
@@ -46,8 +46,8 @@ impl EnuFrame {
         )
     }
 
-    /// Rotation from the east, north and up axes at `place`, in which an INS gives its
-    /// attitude, to the axes of this frame: about 9 mrad for 57 km.
+    /// Rotation from the local level axes at `place`, which an INS attitude refers to, to the axes of this frame; 9
+    /// mrad at a distance of 57 km.
     pub fn enu_from_local_level(&self, place: &Geodetic) -> UnitQuaternion<f64> {
         quaternion(self.ecef_from_enu.tr_mul(&ecef_from_local_level(place)))
     }

@@ -1,23 +1,23 @@
-//! Errors of positions.
+//! Errors of geodetic positions.
 
 use thiserror::Error;
 
-/// A position that is not a place on or near the Earth.
+/// Reason that a position is not on or near the Earth.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum GeodesyError {
-    /// A coordinate is NaN or infinite.
+    /// NaN or infinite coordinate.
     #[error("{name} is {value}; drop the position until the receiver has a fix")]
     NotFinite { name: &'static str, value: f64 },
-    /// The latitude is beyond a pole.
+    /// Latitude beyond a pole.
     #[error(
         "latitude {degrees} deg is not within -90..=90; check the unit and the order of latitude and longitude"
     )]
     Latitude { degrees: f64 },
-    /// The longitude is more than one turn.
+    /// Longitude beyond a full turn.
     #[error("longitude {degrees} deg is not within -360..=360; check the unit")]
     Longitude { degrees: f64 },
-    /// The height is no height above the ellipsoid.
+    /// Ellipsoid height out of range.
     #[error(
         "height {height_m} m is not within {min_m}..={max_m} m above the ellipsoid; check the unit"
     )]
@@ -26,7 +26,7 @@ pub enum GeodesyError {
         min_m: f64,
         max_m: f64,
     },
-    /// An ECEF point too near to, or too far from, the geocentre.
+    /// ECEF position out of range.
     #[error(
         "point is {radius_m} m from the geocentre, not within {min_m}..={max_m} m; check that it is ECEF in metres"
     )]

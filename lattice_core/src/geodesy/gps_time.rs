@@ -5,11 +5,11 @@ const GPS_EPOCH_UNIX_S: i64 = 315_964_800;
 
 const WEEK_S: i64 = 604_800;
 
-/// UTC in nanoseconds since the Unix epoch of a GPS week (since 1980, not modulo 1024)
-/// and milliseconds into it; `leap_seconds` is GPS minus UTC, 18 since 2017.
-/// Saturates after the year 2262.
+/// Converts a GPS week (since 1980, not modulo 1024) and its milliseconds to UTC in nanoseconds since the Unix epoch.
+///
+/// `leap_seconds` is GPS minus UTC, 18 since 2017. Saturates after the year 2262.
 pub fn utc_ns_from_gps(week: u32, week_milliseconds: u32, leap_seconds: i32) -> i64 {
-    // At most 2^32 weeks: far below the limits of i64 in seconds.
+    // 2^32 weeks are far below the limits of `i64` in seconds.
     let whole_s = GPS_EPOCH_UNIX_S + i64::from(week) * WEEK_S - i64::from(leap_seconds);
     whole_s
         .saturating_mul(1_000_000_000)

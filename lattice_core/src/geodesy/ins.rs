@@ -1,22 +1,19 @@
-//! Pose of the machine from position and attitude of an INS.
+//! Pose of the machine from the position and attitude of an INS.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
-/// Yaw, radians counter-clockwise from east within -pi..=pi, of an azimuth in degrees
-/// clockwise from north: 90 degrees is yaw 0.
+/// Yaw in -pi..=pi, counter-clockwise from east, of an azimuth in degrees clockwise from north; 90 degrees is yaw 0.
 pub fn yaw_rad_from_azimuth_deg(azimuth_deg: f64) -> f64 {
     let yaw_rad = (90.0 - azimuth_deg % 360.0).to_radians();
     yaw_rad - TAU * (yaw_rad / TAU).round()
 }
 
-/// Rotation from body axes (x forward, y left, z up) to local east-north-up axes of a
-/// NovAtel attitude in degrees.
+/// Rotation from body axes (x forward, y left, z up) to local east-north-up axes of a NovAtel attitude in degrees.
 ///
-/// NovAtel turns a frame of x right, y forward, z up, first about z by the azimuth
-/// (left-handed, from north), then about x by the pitch, then about y by the roll: in our
-/// axes `Rz(yaw) Ry(-pitch) Rx(roll)`. Positive pitch lifts the nose, positive roll
-/// lowers the right side.
+/// NovAtel rotates a frame of x right, y forward, z up about z by the azimuth (left-handed, from north), then about x
+/// by the pitch, then about y by the roll. In body axes this is `Rz(yaw) Ry(-pitch) Rx(roll)`. Positive pitch raises
+/// the nose, positive roll lowers the right side.
 pub fn enu_from_flu(roll_deg: f64, pitch_deg: f64, azimuth_deg: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_euler_angles(
         roll_deg.to_radians(),
@@ -28,15 +25,14 @@ pub fn enu_from_flu(roll_deg: f64, pitch_deg: f64, azimuth_deg: f64) -> UnitQuat
 /// Mount of an INS on the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InsMount {
-    /// Reference point of the INS position in base_link (FLU), metres.
+    /// Lever arm: reference point of the INS position in base_link (FLU), metres.
     pub lever_arm_m: Vector3<f64>,
     /// Boresight: rotation from the axes of the INS to those of base_link.
     pub base_from_ins: UnitQuaternion<f64>,
 }
 
 impl InsMount {
-    /// Mount from a lever arm in metres and fixed-axis roll, pitch, yaw in radians of the
-    /// INS in base_link.
+    /// Creates a mount from a lever arm in metres and fixed-axis roll, pitch, yaw in radians of the INS in base_link.
     pub fn new(lever_arm_m: Vector3<f64>, boresight_rpy_rad: [f64; 3]) -> InsMount {
         let [roll, pitch, yaw] = boresight_rpy_rad;
         InsMount {
@@ -45,7 +41,7 @@ impl InsMount {
         }
     }
 
-    /// Pose of base_link in the map of what the INS reports in the map.
+    /// Pose of base_link in the map, from the INS pose in the map.
     pub fn map_from_base(
         &self,
         ins_position_m: &Vector3<f64>,

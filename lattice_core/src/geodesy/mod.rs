@@ -1,7 +1,7 @@
 //! WGS84, ECEF, ENU, GPS time and headings.
 //!
-//! Geodetic heights are ellipsoidal. A map is the ENU frame at a fixed origin, never a
-//! projection: it has no zones, no scale factor and no grid convergence.
+//! Heights are ellipsoid heights. A map is an ENU frame at a fixed origin, not a projection: it has no zones, scale
+//! factor or grid convergence.
 
 mod enu;
 mod error;

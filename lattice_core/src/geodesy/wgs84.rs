@@ -1,4 +1,4 @@
-//! The WGS84 ellipsoid: geodetic coordinates to ECEF and back.
+//! WGS84 ellipsoid: geodetic coordinates to ECEF and back.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -16,29 +16,29 @@ const E2: f64 = FLATTENING * (2.0 - FLATTENING);
 /// Second eccentricity squared.
 const EP2: f64 = E2 / (1.0 - E2);
 
-/// Heights taken: what is below or above is a wrong unit, not a place.
+/// Accepted heights; others have a wrong unit.
 const MIN_HEIGHT_M: f64 = -1.0e5;
 const MAX_HEIGHT_M: f64 = 1.0e7;
-/// The same bounds as distances from the geocentre, wide enough at poles and equator.
+/// The same bounds as distances from the geocentre, with a margin for poles and equator.
 const MIN_RADIUS_M: f64 = 6.2e6;
 const MAX_RADIUS_M: f64 = 1.7e7;
-/// Three of Bowring's steps reach rounding everywhere within the bounds above.
+/// Iterations of Bowring's formula that reach rounding accuracy within the bounds above.
 const BOWRING_STEPS: usize = 3;
 
-/// A place on WGS84: geodetic latitude, longitude east, height above the ellipsoid.
+/// Position on WGS84: geodetic latitude, longitude, ellipsoid height.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Geodetic {
     /// Latitude, radians, north positive.
     pub latitude_rad: f64,
     /// Longitude, radians, east positive.
     pub longitude_rad: f64,
-    /// Height above the ellipsoid, metres (not above the geoid).
+    /// Ellipsoid height, metres (not above the geoid).
     pub height_m: f64,
 }
 
 impl Geodetic {
-    /// A place from degrees and metres above the ellipsoid; longitudes of -360..=360 are
-    /// brought to -180..=180.
+    /// Creates a position from degrees and metres above the ellipsoid; longitudes of -360..=360 are wrapped to
+    /// -180..=180.
     pub fn from_degrees(
         latitude_deg: f64,
         longitude_deg: f64,
@@ -83,7 +83,7 @@ impl Geodetic {
     }
 }
 
-/// ECEF position of a place, metres; exact up to rounding.
+/// ECEF coordinates of a position, metres; exact up to rounding.
 pub fn ecef_from_geodetic(place: &Geodetic) -> Vector3<f64> {
     let (sin_lat, cos_lat) = place.latitude_rad.sin_cos();
     let (sin_lon, cos_lon) = place.longitude_rad.sin_cos();
@@ -96,11 +96,10 @@ pub fn ecef_from_geodetic(place: &Geodetic) -> Vector3<f64> {
     )
 }
 
-/// Place of an ECEF position in metres, by Bowring's (1976) formula iterated on the
-/// parametric latitude. At the poles the longitude is that of `atan2`, zero on the axis.
+/// Geodetic position of ECEF coordinates in metres, by iterating Bowring's (1976) formula on the parametric latitude.
 ///
-/// Refuses what is not finite, or further than 100 km below or 10 000 km above the
-/// ellipsoid, the geocentre with it.
+/// At the poles the longitude is that of `atan2`, zero on the axis. Fails if not finite, or more than 100 km below or
+/// 10 000 km above the ellipsoid.
 pub fn geodetic_from_ecef(ecef_m: &Vector3<f64>) -> Result<Geodetic, GeodesyError> {
     finite("ECEF x in metres", ecef_m.x)?;
     finite("ECEF y in metres", ecef_m.y)?;

@@ -1,31 +1,31 @@
 //! Lattices of any basis: Selling reduction, exact nearest points and neighbours.
 //!
-//! In three dimensions every lattice has an obtuse superbase: four vectors of sum 0, no two at an
-//! acute angle. The sums of its proper subsets, 14 vectors, hold all that share a face with the
-//! cell (Conway & Sloane 1992, Low-dimensional lattices VI), and so decide what is nearest.
+//! In three dimensions every lattice has an obtuse superbase: four vectors of sum 0 with no acute angle between any
+//! two. The 14 sums of its proper subsets include all Voronoi-relevant vectors (Conway & Sloane 1992, Low-dimensional
+//! lattices VI), which determine the nearest point.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::closed_form::{ClosedForm, split, within_reach};
 use super::{LatticeError, LatticeIndex};
 
-/// Steps of the reduction after which a basis is taken for too skewed.
+/// Maximum number of reduction steps; beyond it a basis is too skewed.
 const MAX_STEPS: usize = 10_000;
-/// Largest entry of a neighbour's index in the basis as given.
+/// Largest entry of a neighbour's index in the given basis.
 const MAX_ENTRY: i64 = 1000;
-/// Smallest volume over the cubed length of the longest basis vector.
+/// Minimum volume relative to the cubed length of the longest basis vector.
 const MIN_VOLUME_SHARE: f64 = 1e-12;
-/// Dot products up to this, relative to the lengths, count as obtuse.
+/// Dot product, relative to the lengths, up to which an angle is obtuse.
 const ACUTE: f64 = 1e-11;
-/// Squared lengths within this share of each other are one length.
+/// Relative difference up to which squared lengths are equal.
 const SAME: f64 = 1e-9;
-/// Corrections after rounding; one is enough but for ties that rounding errors turn about.
+/// Maximum number of corrections after rounding; more than one only for ties within rounding errors.
 const MAX_CORRECTIONS: usize = 4;
 
-/// An index in the basis as given.
+/// Index in the given basis.
 type Wide = [i64; 3];
 
-/// A sum of superbase vectors that may lead to a nearer lattice point.
+/// Sum of superbase vectors that may lead to a nearer lattice point.
 #[derive(Clone, Copy, Debug)]
 struct Step {
     vector: [f64; 3],
@@ -35,9 +35,9 @@ struct Step {
 
 #[derive(Clone, Debug)]
 pub(super) struct Basis {
-    /// Rows that take a point (metres) to coordinates in the reduced basis.
+    /// Rows that map a point (metres) to coordinates in the reduced basis.
     inverse: [[f64; 3]; 3],
-    /// Reduced basis vectors, metres, and their indices in the basis as given.
+    /// Reduced basis vectors, metres, and their indices in the given basis.
     vectors: [[f64; 3]; 3],
     indices: [Wide; 3],
     steps: [Step; 14],
@@ -80,11 +80,11 @@ impl Basis {
         })
     }
 
-    /// Neighbours in the basis as given, each followed by its opposite: those that share a face, then
-    /// those that only touch.
+    /// Neighbours in the given basis, each followed by its opposite: face neighbours first, then the other touching
+    /// cells.
     ///
-    /// A cell touches those at the shortest vectors of each class modulo twice the lattice, and
-    /// shares a face where there is but one pair of them (Voronoi).
+    /// A cell touches the cells at the shortest vectors of each class modulo twice the lattice. It shares a face if a
+    /// class has a single pair of them (Voronoi).
     pub(super) fn neighbors(&self) -> (Vec<LatticeIndex>, Vec<LatticeIndex>) {
         let mut classes: [Vec<(f64, LatticeIndex)>; 8] = Default::default();
         for code in 0..343 {
@@ -125,7 +125,7 @@ impl Basis {
 }
 
 impl ClosedForm for &Basis {
-    /// Rounds in the reduced basis, then takes the best step as long as one leads nearer.
+    /// Rounds in the reduced basis, then takes the best step while one leads nearer.
     #[inline]
     fn nearest(self, p: [f64; 3]) -> Option<[i64; 3]> {
         let u = self
@@ -155,7 +155,7 @@ impl ClosedForm for &Basis {
     }
 }
 
-/// Selling's reduction: the index of each superbase vector in the basis as given.
+/// Selling's reduction: index of each superbase vector in the given basis.
 fn obtuse_superbase(g: &Matrix3<f64>) -> Result<[Wide; 4], LatticeError> {
     let skewed = || {
         LatticeError::Skewed(format!(

@@ -3,13 +3,13 @@
 use super::{LatticeIndex, MortonKey};
 
 const OFFSET: i32 = 1 << 20;
-/// Bits of a block coordinate: 21 without the three that say where in the block.
+/// Bits of a block coordinate: 21 without the three of the position in the block.
 const BLOCK_BITS: u32 = 18;
 const BLOCK_MASK: u64 = (1 << BLOCK_BITS) - 1;
 
-/// A cell as block and place in the block: blocks have 8 x 8 x 8 lattice indices.
+/// Cell as a block and a position in it; blocks have 8 x 8 x 8 lattice indices.
 ///
-/// Made faster than a [`MortonKey`] and used inside of the stores; it holds the same index. From the top:
+/// Faster to compute than a [`MortonKey`] and used inside the stores; it holds the same index. From the top:
 /// `w_i + 2^20` without its three low bits for i = 0, 1, 2 (18 bits each), then those low bits.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct BlockKey(u64);
@@ -21,14 +21,14 @@ impl BlockKey {
     /// Number of cells in a block.
     pub const BLOCK_CELLS: usize = 512;
 
-    /// The code of a lattice index, `None` if an entry is outside of `-2^20 ..= 2^20 - 1`.
+    /// Code of a lattice index; `None` if an entry is outside `-2^20 ..= 2^20 - 1`.
     #[inline]
     pub fn pack(w: LatticeIndex) -> Option<BlockKey> {
         let v = w.map(|i| i.wrapping_add(OFFSET) as u32);
         ((v[0] | v[1] | v[2]) >> 21 == 0).then(|| BlockKey::from_halves(BlockKey::halves(v)))
     }
 
-    /// The lattice index of the code.
+    /// Lattice index of the code.
     #[inline]
     pub fn unpack(self) -> LatticeIndex {
         let local = self.place() as i32;
@@ -41,26 +41,25 @@ impl BlockKey {
         ]
     }
 
-    /// The cell as a key.
+    /// Morton key of the cell.
     #[inline]
     pub fn key(self) -> Option<MortonKey> {
         MortonKey::pack(self.unpack())
     }
 
-    /// The integer, below 2^63 but for [`BlockKey::NONE`].
+    /// Integer value, below 2^63 except for [`BlockKey::NONE`].
     #[inline]
     pub fn raw(self) -> u64 {
         self.0
     }
 
-    /// The code with this integer, `None` from 2^63 on.
+    /// Code of an integer; `None` from 2^63 on.
     #[inline]
     pub fn from_raw(raw: u64) -> Option<BlockKey> {
         (raw >> 63 == 0).then_some(BlockKey(raw))
     }
 
-    /// Low and high half of the code of indices that 2^20 was added to, each below 2^21: eight lanes
-    /// of 32 bits work at once.
+    /// Low and high half of the code of indices offset by 2^20, each below 2^21; for eight lanes of 32 bits.
     #[inline(always)]
     pub fn halves([x, y, z]: [u32; 3]) -> [u32; 2] {
         let local = (x & 7) << 6 | (y & 7) << 3 | (z & 7);
@@ -68,19 +67,19 @@ impl BlockKey {
         [local | z << 9 | y << 27, y >> 5 | x << 13]
     }
 
-    /// The code with a low and a high half as [`BlockKey::halves`] gives them.
+    /// Code of a low and a high half from [`BlockKey::halves`].
     #[inline(always)]
     pub fn from_halves([low, high]: [u32; 2]) -> BlockKey {
         BlockKey(u64::from(high) << 32 | u64::from(low))
     }
 
-    /// The block: 54 bits.
+    /// Block: 54 bits.
     #[inline]
     pub fn block(self) -> u64 {
         self.0 >> 9
     }
 
-    /// Place in the block, below [`BlockKey::BLOCK_CELLS`].
+    /// Position in the block, below [`BlockKey::BLOCK_CELLS`].
     #[inline]
     pub fn place(self) -> usize {
         (self.0 & 511) as usize

@@ -1,9 +1,8 @@
 //! Exact nearest lattice points in closed form.
 //!
-//! Each form works in coordinates `u` in which the lattice is an integer lattice, a centred one, or
-//! the even-sum lattice D3, and returns the index in the paper's basis. They use only +, -, *,
-//! comparisons and rounding half to even, so that every machine gives the same bits. On a cell
-//! border: half to even, the uncentred coset, the lowest axis.
+//! Each form uses coordinates `u` in which the lattice is an integer lattice, a centred one, or the even-sum lattice
+//! D3. It returns the index in the paper's basis. Only +, -, *, comparisons and rounding half to even are used, so
+//! every machine gives the same bits. On a cell border: half to even, the uncentred coset, the lowest axis.
 
 use std::sync::Arc;
 
@@ -12,20 +11,20 @@ use nalgebra::Matrix3;
 use super::LatticeKind;
 use super::basis::Basis;
 
-/// Adding this leaves a double rounded half to even with the integer in its low bits.
+/// Addend that leaves a double, rounded half to even, as an integer in its low bits.
 const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
 
-/// Largest coordinate that a form answers for; far beyond any index that fits a key.
+/// Largest accepted coordinate, far beyond any index that fits a key.
 const REACH: f64 = (1_u64 << 48) as f64;
 
-/// A coordinate split into its nearest integer and the rest, in [-1/2, 1/2].
+/// Coordinate split into its nearest integer and the remainder in [-1/2, 1/2].
 #[derive(Clone, Copy)]
 pub(super) struct Split {
     pub(super) near: i64,
     pub(super) rest: f64,
 }
 
-/// The nearest integer, half to even, for |u| < 2^51.
+/// Nearest integer, half to even, for |u| < 2^51.
 #[inline(always)]
 pub(crate) fn nearest_integer(u: f64) -> i64 {
     ((u + ROUND).to_bits() as i64).wrapping_sub(ROUND.to_bits() as i64)
@@ -40,7 +39,7 @@ pub(super) fn split(u: f64) -> Split {
 }
 
 impl Split {
-    /// The direction of the rest; + for none.
+    /// Sign of the remainder; + for zero.
     #[inline(always)]
     fn sign(self) -> i64 {
         if self.rest < 0.0 { -1 } else { 1 }
@@ -53,9 +52,9 @@ pub(super) fn within_reach(u: [f64; 3]) -> bool {
     (u[0].abs() < REACH) & (u[1].abs() < REACH) & (u[2].abs() < REACH)
 }
 
-/// A nearest-point function, chosen once per batch.
+/// Nearest-point function, selected once per batch.
 pub(super) trait ClosedForm: Copy {
-    /// Index of the lattice point nearest to `p` (metres), `None` if not finite or out of reach.
+    /// Index of the lattice point nearest to `p` (metres); `None` if not finite or out of range.
     fn nearest(self, p: [f64; 3]) -> Option<[i64; 3]>;
 }
 
@@ -73,9 +72,10 @@ impl ClosedForm for Cubic {
     }
 }
 
-/// Doubled coordinates (all even or all odd) of the nearest point of Z^3 or Z^3 + 1/2, where axis i
-/// weighs `weights[i]`: the centred point is nearer if the weighted rests exceed a quarter of the
-/// weights, since going to it changes the squared distance by sum weight (1/4 - |rest|).
+/// Doubled coordinates (all even or all odd) of the nearest point of Z^3 or Z^3 + 1/2, with axis weights `weights`.
+///
+/// The centred point is nearer if the weighted remainders exceed a quarter of the weights: it changes the squared
+/// distance by sum weight (1/4 - |rest|).
 #[inline(always)]
 fn centred(u: [f64; 3], z_weight: f64) -> [i64; 3] {
     let [x, y, z] = u.map(split);
@@ -84,7 +84,7 @@ fn centred(u: [f64; 3], z_weight: f64) -> [i64; 3] {
     [x, y, z].map(|s| 2 * s.near + odd * s.sign())
 }
 
-/// The body centred cubic lattice in the axes of the paper.
+/// Body-centred cubic lattice in the axes of the paper.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bcc {
     per_metre: f64,
@@ -101,7 +101,7 @@ impl ClosedForm for Bcc {
     }
 }
 
-/// The mean centred lattice: centred tetragonal with c/a = 2^(1/4), in axes that `turn` leads to.
+/// Mean-centred cuboidal lattice: centred tetragonal with c/a = 2^(1/4), in axes rotated by `turn`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mcc {
     turn: [[f64; 3]; 3],
@@ -120,7 +120,7 @@ impl ClosedForm for Mcc {
     }
 }
 
-/// The face centred cubic lattice as D3, the integer points of even sum.
+/// Face-centred cubic lattice as D3, the integer points of even sum.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fcc {
     per_metre: f64,
@@ -146,7 +146,7 @@ impl ClosedForm for Fcc {
     }
 }
 
-/// Hexagonal prisms: a plane lattice with sides 1 : sqrt 3, centred, times the heights.
+/// Hexagonal prisms: a centred plane lattice with sides 1 : sqrt 3, times the heights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hex {
     per_metre: [f64; 3],
@@ -166,7 +166,7 @@ impl ClosedForm for Hex {
     }
 }
 
-/// The form of a lattice; a basis of its own has a short search instead.
+/// Closed form of a lattice; a custom basis uses a short search instead.
 #[derive(Clone, Debug)]
 pub(super) enum Quantizer {
     Cubic(Cubic),
@@ -177,7 +177,7 @@ pub(super) enum Quantizer {
     Basis(Arc<Basis>),
 }
 
-/// Runs the same code for whichever form it is, with the choice made outside.
+/// Dispatches on the form once, outside the loop.
 macro_rules! with_form {
     ($quantizer:expr, $form:ident => $body:expr) => {
         match $quantizer {
@@ -196,7 +196,7 @@ macro_rules! with_form {
 pub(super) use with_form;
 
 impl Quantizer {
-    /// The form for a generator in metres, oriented as the paper prints it; `None` for `Custom`.
+    /// Form of a generator in metres, oriented as in the paper; `None` for `Custom`.
     pub(super) fn new(kind: LatticeKind, g: &Matrix3<f64>) -> Option<Quantizer> {
         Some(match kind {
             LatticeKind::Cubic => Self::Cubic(Cubic {
@@ -219,9 +219,10 @@ impl Quantizer {
     }
 }
 
-/// Rows that take a point to units of the sides of the MCC cuboid: S G^-1 / 2, where S (rows
-/// 1,1,-1; -1,1,1; 1,-1,1) writes the paper's basis as half diagonals. S G^-1 is a rotation but for
-/// the sides, so the distances hold.
+/// Rows that map a point to units of the sides of the MCC cuboid: S G^-1 / 2.
+///
+/// S (rows 1,1,-1; -1,1,1; 1,-1,1) expresses the paper's basis as half diagonals. S G^-1 is a rotation up to the
+/// sides, so it preserves distances.
 fn cuboid_axes(g: &Matrix3<f64>) -> [[f64; 3]; 3] {
     // Inverse of an upper triangular matrix.
     let (i11, i22, i33) = (1.0 / g.m11, 1.0 / g.m22, 1.0 / g.m33);

@@ -1,16 +1,14 @@
 //! Exact generator matrices of unit cell volume.
 //!
-//! The paper prints eq. (8)-(12) to four digits; as a basis those would drift by a centimetre in
-//! 160 m. Here are the closed forms behind them, by +, -, *, / and square roots only, so that every
-//! machine gets the same bits.
+//! The paper prints eq. (8)-(12) to four digits, which would drift by a centimetre over 160 m. These are the closed
+//! forms, computed by +, -, *, / and square roots only, so that every machine gives the same bits.
 
 use nalgebra::Matrix3;
 
 use super::LatticeKind;
 
-/// The generator of unit determinant, columns are the basis, axes as in Ryde & Brünig eq. (8)-(12).
-///
-/// The identity for `Custom`, which has none of its own.
+/// Generator of unit determinant: columns are the basis, axes as in Ryde & Brünig eq. (8)-(12). The identity for
+/// `Custom`.
 pub(super) fn unit_generator(kind: LatticeKind) -> Matrix3<f64> {
     match kind {
         LatticeKind::Cubic | LatticeKind::Custom => Matrix3::identity(),
@@ -36,7 +34,7 @@ pub(super) fn unit_generator(kind: LatticeKind) -> Matrix3<f64> {
             prisms(a, a / 2.0_f64.sqrt())
         }
         LatticeKind::HexOptimal => {
-            // Mean squared error 5/18 A / sqrt(3) + h^2 / 12 is least, for A h = 1, at this height.
+            // Height that minimizes the mean squared error 5/18 A / sqrt(3) + h^2 / 12 for A h = 1.
             let root = 3.0_f64.sqrt();
             let h = cube_root(5.0 / (3.0 * root));
             prisms((2.0 / (root * h)).sqrt(), h)
@@ -44,13 +42,13 @@ pub(super) fn unit_generator(kind: LatticeKind) -> Matrix3<f64> {
     }
 }
 
-/// Hexagonal prisms whose centres are `a` apart in the plane and `h` along z.
+/// Hexagonal prisms with centres `a` apart in the plane and `h` along z.
 fn prisms(a: f64, h: f64) -> Matrix3<f64> {
     let y = 0.5 * 3.0_f64.sqrt() * a;
     Matrix3::new(a, -0.5 * a, 0.0, 0.0, y, 0.0, 0.0, 0.0, h)
 }
 
-/// Cube root of a positive normal number, the same bits on every machine (libm's are not).
+/// Cube root of a positive normal number, bit-identical on every machine, unlike that of libm.
 pub(super) fn cube_root(v: f64) -> f64 {
     let third = v.to_bits() / 3 + (1023_u64 << 52) / 3 * 2;
     let mut y = f64::from_bits(third);

@@ -1,4 +1,4 @@
-//! Names of the lattices.
+//! Kinds of lattices and their names.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,32 +7,32 @@ use serde::{Deserialize, Serialize};
 
 use super::LatticeError;
 
-/// The lattices of Ryde & Brünig 2011, section II-A, the best prisms, and any other.
+/// Kind of a lattice: those of Ryde & Brünig 2011, section II-A, the optimal prisms, and custom ones.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LatticeKind {
     /// Simple cubic, eq. (8).
     Cubic,
-    /// Body centred cubic, eq. (9): truncated octahedra.
+    /// Body-centred cubic, eq. (9): truncated octahedra.
     Bcc,
-    /// Face centred cubic, eq. (10): rhombic dodecahedra.
+    /// Face-centred cubic, eq. (10): rhombic dodecahedra.
     Fcc,
-    /// Mean centred cuboidal, eq. (11).
+    /// Mean-centred cuboidal, eq. (11).
     Mcc,
     /// Hexagonal prisms, eq. (12): flat cells, z up.
     Hex,
-    /// The hexagonal prisms of least mean squared error; a little taller than those of the paper.
+    /// Hexagonal prisms of minimal mean squared error, slightly taller than those of the paper.
     #[serde(rename = "hexopt")]
     HexOptimal,
-    /// The basis that [`super::Lattice::from_basis`] was given.
+    /// Basis given to [`super::Lattice::from_basis`].
     Custom,
 }
 
 impl LatticeKind {
-    /// The lattices of the paper, in its order.
+    /// Lattices of the paper, in its order.
     pub const PAPER: [LatticeKind; 5] = [Self::Cubic, Self::Bcc, Self::Fcc, Self::Mcc, Self::Hex];
 
-    /// Every lattice that has a name and a cell volume: those of the paper, then ours.
+    /// All lattices defined by a name and a cell volume: those of the paper, then `hexopt`.
     pub const ALL: [LatticeKind; 6] = [
         Self::Cubic,
         Self::Bcc,
@@ -42,7 +42,7 @@ impl LatticeKind {
         Self::HexOptimal,
     ];
 
-    /// The name used in parameters, messages and files.
+    /// Name in parameters, messages and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Cubic => "cubic",

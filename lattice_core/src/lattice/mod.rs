@@ -1,8 +1,8 @@
 //! Lattices: generators, exact quantizers, neighbours, Voronoi cells and keys.
 //!
-//! A lattice is all `G w` for integer `w`, with the generator matrix `G` of Ryde & Brünig 2011,
-//! eq. (8)-(12), scaled to a cell volume, or any basis. [`Lattice::quantize`] finds the cell of a
-//! point. [`Lattice::oriented`] turns a lattice in the map.
+//! A lattice is the set of all `G w` for integer `w`, with the generator matrix `G` of Ryde & Brünig 2011, eq.
+//! (8)-(12), scaled to a cell volume, or with any basis. [`Lattice::quantize`] finds the cell of a point.
+//! [`Lattice::oriented`] rotates a lattice in the map.
 
 mod basis;
 mod batch;
@@ -34,39 +34,39 @@ pub use morton_key::MortonKey;
 pub use orientation::Orientation;
 pub use voronoi::{CellFace, VoronoiCell};
 
-/// A lattice point as integer coordinates `w` in the basis that the paper prints, or in the one given.
+/// Lattice point as integer coordinates `w` in the basis of the paper, or in the given one.
 pub type LatticeIndex = [i32; 3];
 
-/// Smallest cell volume, m^3: cells of 1 mm.
+/// Minimum cell volume, m^3: cell size 1 mm.
 pub const MIN_CELL_VOLUME_M3: f64 = 1e-9;
-/// Largest cell volume, m^3: cells of 1 km.
+/// Maximum cell volume, m^3: cell size 1 km.
 pub const MAX_CELL_VOLUME_M3: f64 = 1e9;
 
-/// Largest covering radius of a custom lattice, in cube roots of the cell volume.
+/// Maximum covering radius of a custom lattice, in cell sizes (cube roots of the cell volume).
 pub const MAX_COVERING_SIDES: f64 = 2.0;
 
-/// Indices of [`Lattice::quantize`] are smaller than this.
+/// Bound of the indices of [`Lattice::quantize`].
 const INDEX_LIMIT: u64 = 1 << 20;
 
-/// Error in the description of a lattice.
+/// Error in the definition of a lattice.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum LatticeError {
-    /// No lattice has this name.
+    /// Unknown lattice name.
     #[error("unknown lattice {0:?}: use one of cubic, bcc, fcc, mcc, hex, hexopt")]
     UnknownName(String),
-    /// The cell volume is not a number, or too small or large.
+    /// Cell volume out of range.
     #[error("cell volume {0} m^3 is not between {MIN_CELL_VOLUME_M3} and {MAX_CELL_VOLUME_M3} m^3")]
     CellVolume(f64),
-    /// `Custom` says nothing of the vectors.
+    /// `Custom` without a basis.
     #[error("a custom lattice is made from its basis, with Lattice::from_basis")]
     NoBasis,
-    /// An entry of a basis is NaN or infinite.
+    /// Basis with an entry that is not finite.
     #[error("a basis vector is not finite")]
     NotFinite,
-    /// The basis vectors are too long for the lattice that they span, or too close to one plane.
+    /// Basis vectors too long for their lattice, or nearly coplanar.
     #[error("the basis is too skewed: {0}")]
     Skewed(String),
-    /// A point can be farther from its lattice point than [`MAX_COVERING_SIDES`] allows.
+    /// Covering radius above [`MAX_COVERING_SIDES`].
     #[error(
         "cells are too long or flat: points up to {covering_radius_m} m from their lattice point, \
          allowed are {MAX_COVERING_SIDES} cell sides of {side_m} m"
@@ -74,32 +74,32 @@ pub enum LatticeError {
     Elongated {
         /// Covering radius, metres.
         covering_radius_m: f64,
-        /// Cube root of the cell volume, metres.
+        /// Cell size (cube root of the cell volume), metres.
         side_m: f64,
     },
-    /// No orientation has this name.
+    /// Unknown orientation name.
     #[error("unknown orientation {0:?}: use paper, ground, or a crystal direction like 110-up")]
     UnknownOrientation(String),
-    /// The lattice has no such crystal direction.
+    /// Lattice without that crystal direction.
     #[error("{1} has no direction for {0}: use paper or ground")]
     NoCrystalAxes(Orientation, LatticeKind),
 }
 
-/// A lattice of one kind, cell volume and orientation. Cheap to clone.
+/// Lattice of one kind, cell volume and orientation; cheap to clone.
 #[derive(Clone)]
 pub struct Lattice {
     quantizer: Quantizer,
-    /// In the axes of the map.
+    /// Shape in the axes of the map.
     generator: Matrix3<f64>,
-    /// Rows that take a point to the axes of the quantizer, if they are not those of the map.
+    /// Rows that rotate a point to the axes of the quantizer, if these differ from the map's.
     lattice_from_map: Option<[[f64; 3]; 3]>,
     shape: Arc<Shape>,
 }
 
 impl Lattice {
-    /// The lattice with cells of `cell_volume_m3`, axes as the paper prints them.
+    /// Creates a lattice with cells of `cell_volume_m3`, oriented as in the paper.
     ///
-    /// Fails outside of [`MIN_CELL_VOLUME_M3`] to [`MAX_CELL_VOLUME_M3`], and for `Custom`.
+    /// Fails outside [`MIN_CELL_VOLUME_M3`] to [`MAX_CELL_VOLUME_M3`], and for `Custom`.
     pub fn new(kind: LatticeKind, cell_volume_m3: f64) -> Result<Lattice, LatticeError> {
         check_volume(cell_volume_m3)?;
         let generator = generator::unit_generator(kind) * generator::cube_root(cell_volume_m3);
@@ -109,12 +109,11 @@ impl Lattice {
         Ok(Self::unoriented(quantizer, shape))
     }
 
-    /// The lattice of the basis vectors in the columns of `generator_m`, metres; indices refer to
-    /// them. Its kind is `Custom`.
+    /// Creates the lattice of the basis vectors in the columns of `generator_m`, metres; indices refer to them. Its
+    /// kind is `Custom`.
     ///
-    /// Fails if a number is not finite, if the volume is out of range as for [`Lattice::new`], if the
-    /// vectors are nearly in one plane or far longer than needed, or if the cells are too long or
-    /// flat ([`MAX_COVERING_SIDES`]).
+    /// Fails if a number is not finite, if the volume is out of range as for [`Lattice::new`], if the vectors are
+    /// nearly coplanar or far longer than needed, or if the cells are too elongated or flat ([`MAX_COVERING_SIDES`]).
     pub fn from_basis(generator_m: Matrix3<f64>) -> Result<Lattice, LatticeError> {
         if generator_m.iter().any(|entry| !entry.is_finite()) {
             return Err(LatticeError::NotFinite);
@@ -146,10 +145,10 @@ impl Lattice {
         }
     }
 
-    /// The same lattice turned about 0, so that its own axes lie in the map as `map_from_lattice`
-    /// says; replaces an earlier orientation. Without a rotation, every bit is as before.
+    /// Rotates the lattice about 0, so that its own axes have the orientation `map_from_lattice` in the map.
     ///
-    /// With a rotation that is not finite, no point has a cell.
+    /// Replaces an earlier orientation; the identity changes no bit. With a rotation that is not finite, no point has
+    /// a cell.
     pub fn oriented(self, map_from_lattice: UnitQuaternion<f64>) -> Lattice {
         let rotation = orientation::canonical(map_from_lattice);
         if rotation == self.shape.map_from_lattice {
@@ -169,10 +168,9 @@ impl Lattice {
         }
     }
 
-    /// The lattice with all lengths `factor` times as long; kind, orientation and indices stay.
+    /// Scales all lengths by `factor`; kind, orientation and indices stay.
     ///
-    /// With a power of two every vector is exactly `factor` times that of this lattice. Fails if the
-    /// cell volume gets out of range as for [`Lattice::new`].
+    /// A power of two scales every vector exactly. Fails if the cell volume is out of range as for [`Lattice::new`].
     pub fn scaled(&self, factor: f64) -> Result<Lattice, LatticeError> {
         let cell_volume_m3 = self.cell_volume_m3() * (factor * factor * factor);
         check_volume(cell_volume_m3)?;
@@ -183,8 +181,7 @@ impl Lattice {
         Ok(lattice.oriented(self.orientation()))
     }
 
-    /// The rotation from the lattice's own axes to those of the map; of the two quaternions the one
-    /// with a positive real part.
+    /// Rotation from the lattice's own axes to those of the map, as the quaternion with a positive real part.
     pub fn orientation(&self) -> UnitQuaternion<f64> {
         self.shape.map_from_lattice
     }
@@ -199,17 +196,17 @@ impl Lattice {
         self.shape.cell_volume_m3
     }
 
-    /// Side of a cube of the cell's volume, metres.
+    /// Cell size: edge of the cube of equal volume, metres.
     pub fn cell_side_m(&self) -> f64 {
         generator::cube_root(self.cell_volume_m3())
     }
 
-    /// The generator in the axes of the map: columns are the basis vectors, metres.
+    /// Generator in the axes of the map: columns are the basis vectors, metres.
     pub fn generator(&self) -> Matrix3<f64> {
         self.generator
     }
 
-    /// The generator `G` in the lattice's own axes, as printed by the paper or given, metres.
+    /// Generator `G` in the lattice's own axes, as in the paper or as given, metres.
     pub fn unoriented_generator(&self) -> Matrix3<f64> {
         self.shape.generator
     }
@@ -223,16 +220,16 @@ impl Lattice {
         with_form!(&self.quantizer, form => form.nearest(p))
     }
 
-    /// The lattice point nearest to `p` (metres), exactly; eq. (2) in closed form.
+    /// Quantizes a point: the exact nearest lattice point to `p` (metres), eq. (2) in closed form.
     ///
-    /// `None` if `p` is not finite or an index would reach 2^20 in magnitude. On a border between
-    /// cells the answer is one of them, the same on every machine.
+    /// `None` if `p` is not finite or an index reaches 2^20 in magnitude. On a border between cells the result is one
+    /// of them, the same on every machine.
     #[inline]
     pub fn quantize(&self, p: &Vector3<f64>) -> Option<LatticeIndex> {
         self.nearest([p.x, p.y, p.z]).and_then(narrow)
     }
 
-    /// [`Lattice::quantize`] for many points (metres): `visit` gets each point and its answer.
+    /// [`Lattice::quantize`] for many points (metres): calls `visit` with each point and its result.
     #[inline]
     pub fn quantize_each(
         &self,
@@ -253,12 +250,12 @@ impl Lattice {
         })
     }
 
-    /// [`Lattice::quantize`] with 64-bit indices, up to some 2^48 cells from 0.
+    /// [`Lattice::quantize`] with 64-bit indices, up to 2^48 cells from 0.
     pub fn quantize_wide(&self, p: &Vector3<f64>) -> Option<[i64; 3]> {
         self.nearest([p.x, p.y, p.z])
     }
 
-    /// The lattice point `G w`, metres.
+    /// Lattice point `G w`, metres.
     #[inline]
     pub fn center(&self, w: LatticeIndex) -> Vector3<f64> {
         center(&self.generator, w)
@@ -269,33 +266,33 @@ impl Lattice {
         combine(&self.generator, w.map(|i| i as f64))
     }
 
-    /// Index differences to the cells that share a face.
+    /// Index differences to the face neighbours.
     pub fn face_neighbors(&self) -> &[LatticeIndex] {
         self.shape.face_neighbors()
     }
 
-    /// Index differences to the cells that share a face, an edge or a vertex; faces come first.
+    /// Index differences to all touching cells (sharing a face, an edge or a vertex); face neighbours first.
     pub fn touching_neighbors(&self) -> &[LatticeIndex] {
         &self.shape.touching
     }
 
-    /// The Voronoi cell around the lattice point 0, in the axes of the map.
+    /// Voronoi cell of lattice point 0, in the axes of the map.
     pub fn cell(&self) -> &VoronoiCell {
         &self.shape.cell
     }
 
-    /// Largest distance of any point from its lattice point, metres.
+    /// Covering radius: maximum distance of any point from its lattice point, metres.
     pub fn covering_radius_m(&self) -> f64 {
         self.shape.covering_radius_m
     }
 
-    /// Smallest distance of the cell's surface from its lattice point, metres.
+    /// Inradius: minimum distance of the cell's surface from its lattice point, metres.
     pub fn packing_radius_m(&self) -> f64 {
         self.shape.packing_radius_m
     }
 }
 
-/// Equal if every index means the same point, to the bit.
+/// Equal if every index denotes the same point, to the bit.
 impl PartialEq for Lattice {
     fn eq(&self, other: &Lattice) -> bool {
         let (a, b) = (&self.shape, &other.shape);

@@ -5,33 +5,33 @@ use super::LatticeIndex;
 const BITS: u32 = 21;
 const OFFSET: i64 = 1 << (BITS - 1);
 
-/// A cell as one integer: the Morton interleave of `w_i + 2^20`, 21 bits each, bit 0 from `w_0`.
+/// Cell as one integer: the Morton interleave of `w_i + 2^20`, 21 bits each, bit 0 from `w_0`.
 ///
-/// Keys near in value are near in space, so that sorted keys have small differences.
+/// Keys close in value are close in space, so sorted keys have small differences.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct MortonKey(u64);
 
 impl MortonKey {
-    /// The key of a lattice index, `None` if an entry is outside of `-2^20 ..= 2^20 - 1`.
+    /// Key of a lattice index; `None` if an entry is outside `-2^20 ..= 2^20 - 1`.
     #[inline]
     pub fn pack(w: LatticeIndex) -> Option<MortonKey> {
         let [x, y, z] = w.map(|i| (i64::from(i) + OFFSET) as u64);
         ((x | y | z) >> BITS == 0).then(|| MortonKey(spread(x) | spread(y) << 1 | spread(z) << 2))
     }
 
-    /// The lattice index of the key.
+    /// Lattice index of the key.
     #[inline]
     pub fn unpack(self) -> LatticeIndex {
         [0, 1, 2].map(|axis| (gather(self.0 >> axis) as i64 - OFFSET) as i32)
     }
 
-    /// The integer itself, below 2^63.
+    /// Integer value, below 2^63.
     #[inline]
     pub fn raw(self) -> u64 {
         self.0
     }
 
-    /// The key with this integer, `None` from 2^63 on.
+    /// Key of an integer; `None` from 2^63 on.
     #[inline]
     pub fn from_raw(raw: u64) -> Option<MortonKey> {
         (raw >> (3 * BITS) == 0).then_some(MortonKey(raw))
@@ -48,7 +48,7 @@ fn spread(mut v: u64) -> u64 {
     (v | v << 2) & 0x1249_2492_4924_9249
 }
 
-/// The inverse of `spread`; other bits are ignored.
+/// Inverse of `spread`; other bits are ignored.
 #[inline]
 fn gather(mut v: u64) -> u64 {
     v &= 0x1249_2492_4924_9249;

@@ -1,7 +1,7 @@
 //! Neighbouring cells as lattice index differences.
 //!
-//! Ryde & Brünig eq. (3)-(7), corrected: eq. (7) lacks the pair ±(1,1,1), and the FCC cell touches
-//! six more cells in a vertex than eq. (4) lists, so that 12 are its face neighbours only.
+//! Ryde & Brünig eq. (3)-(7), corrected: eq. (7) lacks the pair ±(1,1,1). The FCC cell touches six more cells in a
+//! vertex than eq. (4) lists; its 12 are only the face neighbours.
 
 use super::{LatticeIndex, LatticeKind};
 
@@ -82,7 +82,7 @@ static HEX: [LatticeIndex; 20] = pairs([
     [1, 1, -1],
 ]);
 
-/// Every cell that shares at least a vertex, face neighbours first; none for `Custom`.
+/// All touching cells, face neighbours first; empty for `Custom`.
 pub(super) fn touching(kind: LatticeKind) -> &'static [LatticeIndex] {
     match kind {
         LatticeKind::Cubic => &CUBIC,
@@ -94,7 +94,7 @@ pub(super) fn touching(kind: LatticeKind) -> &'static [LatticeIndex] {
     }
 }
 
-/// The cells that share a face: the Voronoi-relevant vectors; none for `Custom`.
+/// Face neighbours: the Voronoi-relevant vectors; empty for `Custom`.
 pub(super) fn faces(kind: LatticeKind) -> &'static [LatticeIndex] {
     match kind {
         LatticeKind::Cubic => &CUBIC[..6],

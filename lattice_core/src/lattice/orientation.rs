@@ -1,7 +1,7 @@
 //! Orientation of a lattice in the map.
 //!
-//! The number of cells that flat ground cuts grows with the height of the cell. In the paper's axes
-//! FCC cells stand 1.587 cell sides tall and BCC cells 1.260; lying flat they are 1.122 and 1.091.
+//! The number of cells that flat ground occupies grows with the height of the cell. In the paper's axes FCC cells are
+//! 1.587 cell sizes tall and BCC cells 1.260; in the ground orientation they are 1.122 and 1.091.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,27 +11,27 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use super::generator::unit_generator;
 use super::{Lattice, LatticeError, LatticeKind};
 
-/// A named orientation of a lattice in the map, whose z axis is up.
+/// Named orientation of a lattice in the map, whose z axis is up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Orientation {
-    /// The axes that the paper prints, `paper`.
+    /// Axes of the paper, `paper`.
     #[default]
     Paper,
-    /// The flattest cell: a shortest lattice vector up, `ground`.
+    /// Flattest cell: a shortest lattice vector up, `ground`.
     Ground,
-    /// A direction of the crystal axes up, as `110-up`; each entry is 0 or 1.
+    /// Crystal direction up, such as `110-up`; each entry is 0 or 1.
     ///
-    /// The axes are those of the cube of cubic, BCC and FCC and of the cuboid of MCC, with the long
-    /// side last; the other lattices have none.
+    /// The axes are those of the cube of cubic, BCC and FCC and of the cuboid of MCC, with the long side last. The
+    /// other lattices have none.
     Up([u8; 3]),
 }
 
 impl Orientation {
-    /// The rotation that takes the axes of the paper to those of the map; only by square roots, so
-    /// that every machine gives the same bits.
+    /// Rotation from the axes of the paper to those of the map, computed by square roots only, so that every machine
+    /// gives the same bits.
     ///
-    /// Fails for crystal axes that the lattice does not have. For `Custom`, `Ground` is not known
-    /// here: use [`Lattice::with_orientation`].
+    /// Fails for crystal axes that the lattice does not have. For `Custom`, `Ground` is unknown here: use
+    /// [`Lattice::with_orientation`].
     pub fn map_from_lattice(self, kind: LatticeKind) -> Result<UnitQuaternion<f64>, LatticeError> {
         let up = match self {
             Self::Paper => None,
@@ -51,7 +51,7 @@ impl Orientation {
 }
 
 impl Lattice {
-    /// The lattice turned to a named orientation; see [`Orientation`].
+    /// Rotates the lattice to a named orientation; see [`Orientation`].
     pub fn with_orientation(self, orientation: Orientation) -> Result<Lattice, LatticeError> {
         let rotation = match (self.kind(), orientation) {
             (LatticeKind::Custom, Orientation::Ground) => {
@@ -67,7 +67,7 @@ impl Lattice {
     }
 }
 
-/// A direction of the crystal axes in the axes of the paper; not normalised.
+/// Crystal direction in the axes of the paper; not normalized.
 fn crystal_direction(kind: LatticeKind, axis: [u8; 3]) -> Option<Vector3<f64>> {
     let [h, k, l] = axis.map(f64::from);
     match kind {
@@ -78,7 +78,7 @@ fn crystal_direction(kind: LatticeKind, axis: [u8; 3]) -> Option<Vector3<f64>> {
     }
 }
 
-/// The smallest rotation that takes a direction in the upper half space to z.
+/// Smallest rotation of a direction in the upper half space to z.
 fn upright(direction: Vector3<f64>) -> UnitQuaternion<f64> {
     let direction = if direction.z < 0.0 {
         -direction
@@ -89,7 +89,7 @@ fn upright(direction: Vector3<f64>) -> UnitQuaternion<f64> {
     if direction.x == 0.0 && direction.y == 0.0 {
         return UnitQuaternion::identity();
     }
-    // Half way between twice: (1 + cos, sin axis) before normalisation.
+    // Quaternion of half the angle: (1 + cos, sin axis) before normalization.
     let (x, y, z) = (
         direction.x / length,
         direction.y / length,
@@ -99,8 +99,7 @@ fn upright(direction: Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::new_unchecked(Quaternion::new((1.0 + z) / norm, y / norm, -x / norm, 0.0))
 }
 
-/// The rotation as a matrix, by +, -, * and / only; orthogonal even if the quaternion is not of
-/// length 1 to the last bit.
+/// Rotation as a matrix, by +, -, * and / only; orthogonal even if the quaternion is not exactly of length 1.
 pub(super) fn matrix(rotation: &UnitQuaternion<f64>) -> Matrix3<f64> {
     let (w, x, y, z) = (rotation.w, rotation.i, rotation.j, rotation.k);
     let s = 2.0 / (w * w + x * x + y * y + z * z);
@@ -117,7 +116,7 @@ pub(super) fn matrix(rotation: &UnitQuaternion<f64>) -> Matrix3<f64> {
     )
 }
 
-/// The one of the two quaternions of a rotation whose first number other than 0 is positive.
+/// Quaternion of a rotation whose first nonzero number is positive.
 pub(super) fn canonical(rotation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let (w, x, y, z) = (rotation.w, rotation.i, rotation.j, rotation.k);
     let first = [w, x, y, z].into_iter().find(|c| *c != 0.0);

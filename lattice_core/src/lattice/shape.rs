@@ -5,25 +5,25 @@ use nalgebra::{Matrix3, UnitQuaternion};
 use super::orientation::matrix;
 use super::{LatticeIndex, LatticeKind, VoronoiCell, center};
 
-/// The parts of a lattice that its clones share.
+/// Parts of a lattice shared by its clones.
 #[derive(Clone)]
 pub(super) struct Shape {
     pub(super) kind: LatticeKind,
     pub(super) cell_volume_m3: f64,
-    /// In the lattice's own axes.
+    /// Generator in the lattice's own axes.
     pub(super) generator: Matrix3<f64>,
     pub(super) map_from_lattice: UnitQuaternion<f64>,
-    /// In the axes of the map.
+    /// Voronoi cell in the axes of the map.
     pub(super) cell: VoronoiCell,
     pub(super) covering_radius_m: f64,
     pub(super) packing_radius_m: f64,
-    /// Face neighbours first.
+    /// Touching cells, face neighbours first.
     pub(super) touching: Vec<LatticeIndex>,
     faces: usize,
 }
 
 impl Shape {
-    /// Unoriented; `touching` starts with `faces`.
+    /// Creates an unoriented shape; `touching` starts with `faces`.
     pub(super) fn new(
         kind: LatticeKind,
         cell_volume_m3: f64,
@@ -48,7 +48,7 @@ impl Shape {
         }
     }
 
-    /// The shape with another rotation; corners and faces keep their numbers.
+    /// Rotates the shape; vertices and faces keep their indices.
     pub(super) fn oriented(&self, map_from_lattice: UnitQuaternion<f64>) -> Shape {
         let mut cell = VoronoiCell::new(&self.generator, self.face_neighbors());
         if map_from_lattice != UnitQuaternion::identity() {

@@ -1,25 +1,25 @@
-//! The Voronoi cell of a lattice.
+//! Voronoi cell of a lattice.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::LatticeIndex;
 
-/// Largest distance of a vertex beyond a face, relative to the squared length of the neighbour.
+/// Tolerance of a vertex beyond a face, relative to the squared length of the neighbour.
 const SLACK: f64 = 1e-9;
 
-/// The cell around the lattice point 0: all points nearest to it. Metres, axes of the map.
+/// Voronoi cell of lattice point 0, metres, in the axes of the map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoronoiCell {
-    /// Corners, each once.
+    /// Vertices, each once.
     pub vertices: Vec<Vector3<f64>>,
-    /// One face for each face neighbour, in the order of `Lattice::face_neighbors`.
+    /// Faces, in the order of `Lattice::face_neighbors`.
     pub faces: Vec<CellFace>,
 }
 
-/// A convex polygon halfway to a neighbouring cell.
+/// Convex polygon halfway to a neighbouring cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CellFace {
-    /// The cell on the other side.
+    /// Index difference to the cell on the other side.
     pub neighbor: LatticeIndex,
     /// Indices of `VoronoiCell::vertices`, counter-clockwise seen from outside.
     pub vertices: Vec<u16>,
@@ -53,7 +53,7 @@ impl VoronoiCell {
             .sum()
     }
 
-    /// The corners of a face in order.
+    /// Vertices of a face in order.
     pub fn polygon(&self, face: &CellFace) -> impl Iterator<Item = Vector3<f64>> + '_ {
         let vertices = face.vertices.clone();
         vertices
@@ -61,7 +61,7 @@ impl VoronoiCell {
             .filter_map(|i| self.vertices.get(usize::from(i)).copied())
     }
 
-    /// A face as a fan of triangles, counter-clockwise seen from outside.
+    /// Triangle fan of a face, counter-clockwise seen from outside.
     pub fn triangles(&self, face: &CellFace) -> Vec<[Vector3<f64>; 3]> {
         let corners: Vec<_> = self.polygon(face).collect();
         let Some((&first, rest)) = corners.split_first() else {
@@ -78,7 +78,7 @@ fn on_plane(normal: &Vector3<f64>, p: &Vector3<f64>) -> bool {
     (normal.dot(p) - 0.5 * normal.norm_squared()).abs() <= SLACK * normal.norm_squared()
 }
 
-/// The points where three planes meet inside of all others, each once.
+/// Points on three planes that satisfy all others, each once.
 fn corners(normals: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let mut found: Vec<Vector3<f64>> = Vec::new();
     for (i, a) in normals.iter().enumerate() {
@@ -103,7 +103,7 @@ fn corners(normals: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     found
 }
 
-/// The vertices on the plane of `normal`, ordered around it.
+/// Vertices on the plane of `normal`, ordered around it.
 fn polygon(normal: &Vector3<f64>, vertices: &[Vector3<f64>]) -> Vec<u16> {
     let on: Vec<(u16, Vector3<f64>)> = (0..)
         .zip(vertices.iter().copied())

@@ -1,4 +1,4 @@
-//! Axes of headsets and cameras, and the way to those of ROS.
+//! Axis conventions of headsets and cameras, and their conversion to that of ROS.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,9 +6,9 @@ use std::str::FromStr;
 use nalgebra::{Matrix3, Point3, Vector3};
 use thiserror::Error;
 
-/// Directions of x, y and z in a frame; ROS has x forward, y left, z up (REP 103).
+/// Axis convention of a frame; ROS has x forward, y left, z up (REP 103).
 ///
-/// The conversions move and negate numbers and so are exact.
+/// Conversions permute and negate coordinates and are exact.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Axes {
     /// Forward, left, up: ROS.
@@ -22,13 +22,13 @@ pub enum Axes {
     Optical,
 }
 
-/// A name that is none of [`Axes::ALL`].
+/// Unknown name of an axis convention.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
 #[error("unknown axes '{0}', expected ros_flu, unity_ruf, winrt_rub or optical")]
 pub struct UnknownAxes(pub String);
 
 impl Axes {
-    /// All axes.
+    /// All axis conventions.
     pub const ALL: [Axes; 4] = [Axes::RosFlu, Axes::UnityRuf, Axes::WinrtRub, Axes::Optical];
 
     /// Name in parameters.
@@ -41,14 +41,13 @@ impl Axes {
         }
     }
 
-    /// The matrix that takes coordinates in these axes to those in the axes of ROS; its determinant
-    /// is -1 for left-handed axes.
+    /// Matrix from these axes to those of ROS; its determinant is -1 for left-handed axes.
     pub fn matrix(self) -> Matrix3<f64> {
         let unit = [Vector3::x(), Vector3::y(), Vector3::z()];
         Matrix3::from_columns(&unit.map(|axis| self.to_ros(axis)))
     }
 
-    /// A vector in the axes of ROS.
+    /// Converts a vector to the axes of ROS.
     pub fn to_ros(self, v: Vector3<f64>) -> Vector3<f64> {
         match self {
             Axes::RosFlu => v,
@@ -58,7 +57,7 @@ impl Axes {
         }
     }
 
-    /// A vector of ROS in these axes.
+    /// Converts a vector from the axes of ROS.
     pub fn from_ros(self, v: Vector3<f64>) -> Vector3<f64> {
         match self {
             Axes::RosFlu => v,
@@ -68,7 +67,7 @@ impl Axes {
         }
     }
 
-    /// A point in the axes of ROS.
+    /// Converts a point to the axes of ROS.
     pub fn point_to_ros(self, p: &Point3<f64>) -> Point3<f64> {
         self.to_ros(p.coords).into()
     }

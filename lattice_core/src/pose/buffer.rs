@@ -1,4 +1,4 @@
-//! Poses of a machine by time.
+//! Buffer of timed poses of a machine.
 
 use nalgebra::Isometry3;
 use thiserror::Error;
@@ -6,25 +6,25 @@ use thiserror::Error;
 use super::interpolate::is_rigid;
 use super::track::{Track, duration_ns};
 
-/// Pose of base_link in the map at a time.
+/// Pose of base_link in the map at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StampedPose {
-    /// Nanoseconds since the Unix epoch.
+    /// Time, nanoseconds since the Unix epoch.
     pub stamp_ns: i64,
-    /// Transform to the map frame from base_link, metres.
+    /// Transform from base_link to the map frame, metres.
     pub map_from_base: Isometry3<f64>,
 }
 
 /// Bounds of a [`PoseBuffer`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseBufferOptions {
-    /// Age against the newest pose up to which poses are kept, seconds.
+    /// Maximum age of a kept pose relative to the newest one, seconds.
     pub span_s: f64,
-    /// Longest time between two poses that is interpolated over, seconds.
+    /// Maximum time between two interpolated poses, seconds.
     pub max_gap_s: f64,
-    /// Most poses kept, at least 2.
+    /// Maximum number of poses, at least 2.
     pub max_poses: usize,
-    /// A pose older than the newest by more than this means that time was set back, seconds.
+    /// Time step backwards from which a pose resets the buffer, seconds.
     pub jump_back_s: f64,
 }
 
@@ -42,30 +42,30 @@ impl Default for PoseBufferOptions {
 /// Outcome of pushing a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PushOutcome {
-    /// Kept.
+    /// The pose was kept.
     Accepted,
-    /// Time was set back: all poses before it were forgotten, this one is kept.
+    /// Time jumped back: earlier poses were dropped, this one was kept.
     JumpedBack,
-    /// Refused: not newer than what is there.
+    /// Refused: not newer than the newest pose.
     OutOfOrder,
-    /// Refused: a number is NaN or infinite, or the rotation is none.
+    /// Refused: not finite, or not a rotation.
     NotFinite,
 }
 
-/// A pose that is not available.
+/// Reason that a pose is unavailable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum PoseMiss {
-    /// No pose came yet.
+    /// No pose was received.
     #[error("no pose came yet")]
     Empty,
-    /// The time is before the oldest pose kept.
+    /// Time before the oldest kept pose.
     #[error("time is {:.6} s before the oldest pose kept", seconds(by_ns))]
     BeforeStart { by_ns: i64 },
-    /// The time is after the newest pose: it may still be covered.
+    /// Time after the newest pose; a later pose may cover it.
     #[error("time is {:.6} s after the newest pose", seconds(by_ns))]
     AfterEnd { by_ns: i64 },
-    /// The poses around the time are too far apart.
+    /// Gap between the poses around the time.
     #[error(
         "poses around the time are {:.6} s apart, over {:.6} s",
         seconds(gap_ns),
@@ -78,7 +78,7 @@ pub(super) fn seconds(ns: &i64) -> f64 {
     *ns as f64 * 1.0e-9
 }
 
-/// The last poses of a machine, by time.
+/// Recent poses of a machine, by time.
 #[derive(Clone, Debug)]
 pub struct PoseBuffer {
     track: Track,
@@ -89,7 +89,7 @@ pub struct PoseBuffer {
 }
 
 impl PoseBuffer {
-    /// Empty buffer; negative or NaN durations count as zero.
+    /// Creates an empty buffer; negative or NaN durations count as zero.
     pub fn new(options: PoseBufferOptions) -> PoseBuffer {
         PoseBuffer {
             track: Track::default(),
@@ -100,12 +100,12 @@ impl PoseBuffer {
         }
     }
 
-    /// Interpolates over at most so many seconds from now on.
+    /// Sets the maximum interpolation gap, seconds.
     pub fn set_max_gap_s(&mut self, max_gap_s: f64) {
         self.max_gap_ns = duration_ns(max_gap_s);
     }
 
-    /// Takes the next pose and forgets what is out of bounds.
+    /// Appends a pose and drops those out of bounds.
     pub fn push(&mut self, pose: StampedPose) -> PushOutcome {
         if !is_rigid(&pose.map_from_base) {
             return PushOutcome::NotFinite;
@@ -125,8 +125,7 @@ impl PoseBuffer {
         outcome
     }
 
-    /// Takes a pose at its place in time, however old; one of a time that there is already is
-    /// [`PushOutcome::OutOfOrder`].
+    /// Inserts a pose in time order, however old; one with an existing time is [`PushOutcome::OutOfOrder`].
     pub fn insert(&mut self, pose: StampedPose) -> PushOutcome {
         if !is_rigid(&pose.map_from_base) {
             return PushOutcome::NotFinite;
@@ -138,13 +137,13 @@ impl PoseBuffer {
         PushOutcome::Accepted
     }
 
-    /// map_from_base at a time: exact at a pose, else linear and slerp between two; never
-    /// outside of the poses, nor over a gap.
+    /// `map_from_base` at a time: exact at a pose, else linear interpolation and slerp; no extrapolation, and no
+    /// interpolation over a gap.
     pub fn at(&self, stamp_ns: i64) -> Result<Isometry3<f64>, PoseMiss> {
         self.track.at(stamp_ns, self.max_gap_ns)
     }
 
-    /// Poses after one time and before another, in order.
+    /// Poses between two times (exclusive), in order.
     pub fn between(&self, after_ns: i64, before_ns: i64) -> impl Iterator<Item = StampedPose> {
         let samples = self.track.between(after_ns, before_ns);
         samples.map(|&(stamp_ns, map_from_base)| StampedPose {
@@ -158,27 +157,27 @@ impl PoseBuffer {
         self.track.newest_ns()
     }
 
-    /// Time of the oldest pose kept, nanoseconds.
+    /// Time of the oldest pose, nanoseconds.
     pub fn oldest_ns(&self) -> Option<i64> {
         self.track.oldest_ns()
     }
 
-    /// Poses kept.
+    /// Number of poses.
     pub fn len(&self) -> usize {
         self.track.len()
     }
 
-    /// True if no pose is kept.
+    /// Tests whether the buffer is empty.
     pub fn is_empty(&self) -> bool {
         self.track.len() == 0
     }
 
-    /// Forgets all poses.
+    /// Drops all poses.
     pub fn clear(&mut self) {
         self.track.clear();
     }
 
-    /// Checks the order, the bounds and the poses; for tests.
+    /// Validates the order, the bounds and the poses; for tests.
     pub fn validate(&self) -> Result<(), String> {
         if let (Some(oldest), Some(newest)) = (self.oldest_ns(), self.newest_ns())
             && newest.saturating_sub(oldest) > self.span_ns

@@ -3,20 +3,20 @@
 use super::TfInsertError;
 
 const MAX_NAME_BYTES: usize = 256;
-/// Longest part of a foreign name repeated in an error.
+/// Maximum length of a name repeated in an error.
 const SHOWN_CHARS: usize = 64;
 
-/// The name without leading slashes, which tf wrote once.
+/// Removes leading slashes, which tf1 wrote.
 pub(super) fn bare(name: &str) -> &str {
     name.trim_start_matches('/')
 }
 
-/// A foreign name, fit for a log.
+/// Name from outside, truncated for a log.
 pub(super) fn shown(name: &str) -> String {
     bare(name).chars().take(SHOWN_CHARS).collect()
 }
 
-/// Refuses names that are empty or too long.
+/// Rejects names that are empty or too long.
 pub(super) fn check_names(parent: &str, child: &str) -> Result<(), TfInsertError> {
     for name in [parent, child] {
         if name.len() > MAX_NAME_BYTES {

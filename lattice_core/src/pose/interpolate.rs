@@ -2,11 +2,10 @@
 
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion};
 
-/// Above this cosine of the half angle, slerp and the straight line agree to the last bit.
+/// Cosine of the half angle above which slerp and linear interpolation agree to the last bit.
 const NEARLY_EQUAL: f64 = 1.0 - 1.0e-14;
 
-/// Pose at `fraction` of the way from `a` (0) to `b` (1): translation on the straight line,
-/// rotation by slerp on the shorter arc.
+/// Pose at `fraction` between `a` (0) and `b` (1): linear translation, slerp on the shorter arc.
 pub fn interpolate(a: &Isometry3<f64>, b: &Isometry3<f64>, fraction: f64) -> Isometry3<f64> {
     let translation = a.translation.vector.lerp(&b.translation.vector, fraction);
     Isometry3::from_parts(
@@ -17,7 +16,7 @@ pub fn interpolate(a: &Isometry3<f64>, b: &Isometry3<f64>, fraction: f64) -> Iso
 
 fn slerp(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>, fraction: f64) -> UnitQuaternion<f64> {
     let dot = a.coords.dot(&b.coords);
-    // q and -q are one rotation: take the sign that is nearer.
+    // q and -q are one rotation: use the nearer sign.
     let sign = if dot < 0.0 { -1.0 } else { 1.0 };
     let cosine = dot.abs();
     let (weight_a, weight_b) = if cosine > NEARLY_EQUAL {
@@ -34,7 +33,7 @@ fn slerp(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>, fraction: f64) -> Uni
     Unit::new_normalize(Quaternion::from(coords))
 }
 
-/// True if all numbers are finite and the rotation is one.
+/// Tests whether a pose is finite and its rotation normalized.
 pub(super) fn is_rigid(pose: &Isometry3<f64>) -> bool {
     pose.translation.vector.iter().all(|v| v.is_finite())
         && (pose.rotation.coords.norm() - 1.0).abs() < 1.0e-3

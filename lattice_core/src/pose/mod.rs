@@ -1,8 +1,8 @@
-//! Poses on SE(3): buffers that interpolate and never extrapolate, axes of other systems.
+//! Poses on SE(3): buffers that interpolate without extrapolation, and axis conventions.
 //!
-//! [`PoseBuffer`] holds where the machine was, [`TransformBuffer`] the tree of its frames.
-//! Both answer exactly at their samples, by linear interpolation and slerp between them,
-//! and with the reason where they cannot answer. Both are bounded in memory. [`Axes`] brings headsets and cameras to the axes of ROS.
+//! [`PoseBuffer`] holds the poses of the machine, [`TransformBuffer`] the tree of its frames. Both are exact at their
+//! samples and interpolate between them (linear and slerp); else they return a reason. Their memory is bounded.
+//! [`Axes`] converts from headsets and cameras to the axes of ROS.
 
 mod axes;
 mod buffer;

@@ -5,10 +5,10 @@
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6};
 
-/// Below this angle (rad) the coefficients are series.
+/// Angle below which the coefficients are evaluated as series, radians.
 const SERIES_RAD: f64 = 0.1;
 
-/// The transform of a twist (rho, phi), m and rad.
+/// Exponential: transform of a twist (rho, phi), m and rad.
 pub fn exp(twist: &Vector6<f64>) -> Isometry3<f64> {
     let rho = twist.fixed_rows::<3>(0).into_owned();
     let phi = twist.fixed_rows::<3>(3).into_owned();
@@ -33,7 +33,7 @@ pub fn exp(twist: &Vector6<f64>) -> Isometry3<f64> {
     )
 }
 
-/// The twist (rho, phi) of a transform, m and rad; the angle is at most pi.
+/// Logarithm: twist (rho, phi) of a transform, m and rad; the angle is at most pi.
 pub fn log(transform: &Isometry3<f64>) -> Vector6<f64> {
     let (phi, angle) = rotation_vector(&transform.rotation);
     // (1 - angle / 2 cot(angle / 2)) / angle^2
@@ -50,10 +50,10 @@ pub fn log(transform: &Isometry3<f64>) -> Vector6<f64> {
     Vector6::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
 }
 
-/// Axis times angle (rad) and the angle, from 0 to pi.
+/// Rotation vector (rad) and its angle, 0 to pi.
 fn rotation_vector(rotation: &UnitQuaternion<f64>) -> (Vector3<f64>, f64) {
     let q = rotation.quaternion();
-    // q and -q are one rotation; the one with w >= 0 turns by at most pi.
+    // q and -q are one rotation; the one with w >= 0 has an angle of at most pi.
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
     let (w, v) = (sign * q.w, sign * q.imag());
     let sine = v.norm();

@@ -1,20 +1,20 @@
-//! Transforms that are refused, and reasons for which there is none.
+//! Reasons that a transform is refused or unavailable.
 
 use thiserror::Error;
 
 use super::buffer::seconds;
 
-/// A transform that is refused.
+/// Reason that a transform is refused.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum TfInsertError {
-    /// A frame has no name.
+    /// Frame without a name.
     #[error("transform from '{child}' to '{parent}' has a frame without a name")]
     NoName { parent: String, child: String },
-    /// A name is too long to be one.
+    /// Frame name that is too long.
     #[error("frame name has {bytes} bytes, over {max_bytes}")]
     LongName { bytes: usize, max_bytes: usize },
-    /// A number is NaN or infinite, or the rotation is none.
+    /// Transform that is not finite or not a rotation.
     #[error(
         "transform of '{child}' in '{parent}' is not finite, or its quaternion not of length 1"
     )]
@@ -28,36 +28,36 @@ pub enum TfInsertError {
         child: String,
         max_frames: usize,
     },
-    /// A frame is given as its own parent.
+    /// Frame that is its own parent.
     #[error("transform of '{0}' in itself")]
     Itself(String),
 }
 
-/// A transform that is not available.
+/// Reason that a transform is unavailable.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum TfMiss {
-    /// No transform ever named the frame.
-    #[error("frame '{frame}' is not known: nobody published it on tf or tf_static")]
+    /// Unknown frame.
+    #[error("unknown frame '{frame}': no transform of it was received on tf or tf_static")]
     UnknownFrame { frame: String },
-    /// The frames are in two trees.
+    /// Frames in two trees.
     #[error(
         "no path from frame '{from}' to '{to}': a transform between their trees is not published"
     )]
     Disconnected { from: String, to: String },
-    /// The time is before what is kept of a frame on the path.
+    /// Time before the history of a frame on the path.
     #[error(
         "time is {:.6} s before what is kept of frame '{frame}'",
         seconds(by_ns)
     )]
     TooOld { frame: String, by_ns: i64 },
-    /// The time is after what came of a frame on the path: it may still come.
+    /// Time after the newest transform of a frame on the path; a later one may cover it.
     #[error(
         "time is {:.6} s after the newest transform of frame '{frame}'",
         seconds(by_ns)
     )]
     TooNew { frame: String, by_ns: i64 },
-    /// The transforms around the time are too far apart.
+    /// Gap between the transforms around the time.
     #[error(
         "transforms of frame '{frame}' are {:.6} s apart, over {:.6} s",
         seconds(gap_ns),
@@ -71,7 +71,7 @@ pub enum TfMiss {
 }
 
 impl TfMiss {
-    /// True if waiting for the next transforms may help: the time is only too new.
+    /// Tests whether a later transform may resolve the error: the time is only too new.
     pub fn may_still_come(&self) -> bool {
         matches!(self, TfMiss::TooNew { .. })
     }

@@ -1,4 +1,4 @@
-//! Stamped transforms of one frame, in the order of time.
+//! Stamped transforms of one frame, in time order.
 
 use nalgebra::Isometry3;
 use std::collections::VecDeque;
@@ -28,7 +28,7 @@ impl Track {
         self.samples.clear();
     }
 
-    /// Puts a sample in its place; false if there is one of that time already.
+    /// Inserts a sample in time order; false if its time exists already.
     pub fn insert(&mut self, stamp_ns: i64, pose: Isometry3<f64>) -> bool {
         let at = match self.newest_ns() {
             Some(newest_ns) if stamp_ns <= newest_ns => {
@@ -43,8 +43,7 @@ impl Track {
         true
     }
 
-    /// Forgets what is older than the newest by more than `span_ns`, and the oldest of more
-    /// than `max_samples`.
+    /// Drops samples older than the newest by more than `span_ns`, and the oldest beyond `max_samples`.
     pub fn trim(&mut self, span_ns: i64, max_samples: usize) {
         let Some(newest_ns) = self.newest_ns() else {
             return;
@@ -57,8 +56,7 @@ impl Track {
         }
     }
 
-    /// Pose at a time: a sample as it is, else between two that are at most `max_gap_ns`
-    /// apart.
+    /// Pose at a time: exact at a sample, else interpolated between two that are at most `max_gap_ns` apart.
     pub fn at(&self, stamp_ns: i64, max_gap_ns: i64) -> Result<Isometry3<f64>, PoseMiss> {
         let (Some(oldest_ns), Some(newest_ns)) = (self.oldest_ns(), self.newest_ns()) else {
             return Err(PoseMiss::Empty);
@@ -92,7 +90,7 @@ impl Track {
         Ok(interpolate(before, after, fraction))
     }
 
-    /// Samples after one time and before another, in order.
+    /// Samples between two times (exclusive), in order.
     pub fn between(
         &self,
         after_ns: i64,
@@ -122,7 +120,7 @@ impl Track {
     }
 }
 
-/// Nanoseconds of a duration in seconds: not negative, saturating, zero for NaN.
+/// Converts seconds to nanoseconds: at least 0, saturating, 0 for NaN.
 pub(super) fn duration_ns(seconds: f64) -> i64 {
     (seconds * 1.0e9).round().max(0.0) as i64
 }

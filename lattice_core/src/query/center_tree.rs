@@ -1,4 +1,4 @@
-//! The centres of occupied cells as a k-d tree, for many questions.
+//! k-d tree of the centres of occupied cells, for many queries.
 
 use std::collections::BinaryHeap;
 use std::sync::Arc;
@@ -9,26 +9,26 @@ use rayon::prelude::*;
 use crate::kd_tree::{Item, Keep, Tree};
 use crate::lattice::{Lattice, MortonKey};
 
-/// More than the rounding of a root and its square.
+/// Factor above the rounding of a root and its square.
 const SLACK: f64 = 1.0 + 4.0 * f64::EPSILON;
-/// Up to so many cells are kept in order, more as a heap.
+/// Result size up to which cells are kept sorted, above it as a heap.
 const FEW: usize = 128;
 
-/// The tree of one state of a store, which [`Query`](super::Query)s of this state may share: 32 bytes a cell.
+/// k-d tree of one state of a store, shared by the [`Query`](super::Query)s of this state; 32 bytes per cell.
 #[derive(Clone)]
 pub struct PreparedNearest(Arc<CenterTree>);
 
-/// The centres, from the datum, and their keys in the order of the tree.
+/// Centres relative to the datum, and their keys in the order of the tree.
 struct CenterTree {
     tree: Tree,
     keys: Vec<MortonKey>,
 }
 
-/// A cell as the bits of its distance, which order as it does, and its key.
+/// Cell as the bits of its distance, which sort as the distance does, and its key.
 pub(super) type Found = (u64, MortonKey);
 
 impl PreparedNearest {
-    /// The tree of cells; `None` if they are more than 32 bits number.
+    /// Builds the tree; `None` if the cells exceed 32-bit indices.
     pub(super) fn new(lattice: &Lattice, keys: Vec<MortonKey>) -> Option<PreparedNearest> {
         u32::try_from(keys.len()).ok()?;
         let item = |(index, key): (usize, &MortonKey)| Item {
@@ -42,7 +42,7 @@ impl PreparedNearest {
         Some(PreparedNearest(Arc::new(CenterTree { tree, keys })))
     }
 
-    /// The `k` cells nearest to a point, from the datum, nearest first.
+    /// The `k` cells nearest to a point (relative to the datum), nearest first.
     pub(super) fn nearest(&self, local_m: &Vector3<f64>, k: usize) -> Vec<Found> {
         let CenterTree { tree, keys } = &*self.0;
         let query = Point3::from(*local_m);
@@ -71,7 +71,7 @@ impl PreparedNearest {
     }
 }
 
-/// Square of a distance, and a little more.
+/// Square of a distance, rounded up.
 #[inline(always)]
 fn reach_of((bits, _): Found) -> f64 {
     let distance_m = f64::from_bits(bits);
@@ -84,7 +84,7 @@ fn found(keys: &[MortonKey], index: u32, squared: f64) -> Option<Found> {
     Some((squared.sqrt().to_bits(), *key))
 }
 
-/// The nearest cells in order.
+/// Nearest cells, sorted.
 struct Few<'a> {
     keys: &'a [MortonKey],
     k: usize,
@@ -120,7 +120,7 @@ impl Keep for Few<'_> {
     }
 }
 
-/// The nearest cells, the farthest on top.
+/// Nearest cells as a heap, the farthest on top.
 struct Many<'a> {
     keys: &'a [MortonKey],
     k: usize,

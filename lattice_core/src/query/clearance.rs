@@ -8,18 +8,17 @@ use super::{Query, QueryError, Segment, gjk};
 use crate::lattice::{MortonKey, VoronoiCell};
 use crate::voxels::VoxelStore;
 
-/// The occupied cell that is nearest to a segment.
+/// Occupied cell nearest to a segment.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Clearance {
     /// Distance from the segment to the cell, metres; 0 if they touch or overlap.
     pub distance_m: f64,
-    /// The cell.
+    /// Key of the cell.
     pub key: MortonKey,
 }
 
 impl<S: VoxelStore> Query<'_, S> {
-    /// Distance from a point or line to the nearest occupied cell, taken as the polyhedron that it
-    /// is; `None` if that is more than `max_m`.
+    /// Distance from a point or segment to the nearest occupied cell as a polyhedron; `None` if it exceeds `max_m`.
     pub fn clearance(
         &self,
         segment: &Segment,
@@ -42,13 +41,13 @@ impl<S: VoxelStore> Query<'_, S> {
         Ok(search.best)
     }
 
-    /// True if no occupied cell touches the segment widened by `radius_m`.
+    /// Tests whether no occupied cell touches the segment inflated by `radius_m`.
     pub fn is_free(&self, segment: &Segment, radius_m: f64) -> Result<bool, QueryError> {
         Ok(self.clearance(segment, radius_m)?.is_none())
     }
 }
 
-/// Distance between a segment and a cell around a centre, in one frame.
+/// Distance between a segment and a cell at a centre, in one frame.
 pub(super) fn cell_distance_m(
     segment: &Segment,
     cell: &VoronoiCell,
@@ -70,7 +69,7 @@ struct ClearanceSearch<'a> {
     segment: Segment,
     cell: &'a VoronoiCell,
     covering_radius_m: f64,
-    /// Cells that are farther do not matter.
+    /// Farther cells do not matter.
     limit_m: f64,
     best: Option<Clearance>,
 }
@@ -89,7 +88,7 @@ impl Search for ClearanceSearch<'_> {
     }
 
     fn visit(&mut self, key: MortonKey, center_m: &Vector3<f64>) {
-        // In contact with a lower key already: no cell can do better.
+        // Contact with a lower key cannot be improved.
         let settled = |best: Clearance| best.distance_m == 0.0 && best.key < key;
         let slack_m = 1e-9 * self.covering_radius_m;
         if self.best.is_some_and(settled) || self.distance_m(center_m) > self.reach_m() + slack_m {

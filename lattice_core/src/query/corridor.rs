@@ -1,4 +1,4 @@
-//! Stencils of the cells that block a ball at the centre of a cell, and on its way to the next.
+//! Stencils of the cells that block a ball at the centre of a cell and on a step to the next.
 
 use rustc_hash::FxHashSet;
 
@@ -8,15 +8,15 @@ use super::{PathError, Segment};
 use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
 
-/// Most cells that a robot may cover.
+/// Maximum number of cells that a robot covers.
 pub const MAX_ROBOT_CELLS: usize = 1 << 16;
 
 pub(super) struct Corridor {
-    /// Cells that touch the ball in the middle of cell 0, nearest first.
+    /// Cells that touch the ball at the centre of cell 0, nearest first.
     at: Vec<LatticeIndex>,
-    /// To where a step leads, and its length.
+    /// Index difference and length of each step.
     pub(super) steps: Vec<(LatticeIndex, f64)>,
-    /// For each step, cells that touch the ball on its way and at neither end.
+    /// For each step, cells that touch the ball between its ends only.
     between: Vec<Vec<LatticeIndex>>,
 }
 
@@ -48,7 +48,7 @@ impl Corridor {
         let ball: FxHashSet<LatticeIndex> = at.iter().copied().collect();
         let between = |&to: &LatticeIndex| -> Vec<LatticeIndex> {
             let back = to.map(|w| -w);
-            // One of both directions decides for both, so that ways back are the same.
+            // One direction decides for both, so that paths are reversible.
             let forward = if to > back { to } else { back };
             let line = way(forward);
             let cells = touching(&line, reach_m + line.to_m.norm());
@@ -68,7 +68,7 @@ impl Corridor {
         })
     }
 
-    /// Cells with their centres within a distance of that of cell 0, nearest first.
+    /// Cells with centres within a distance of that of cell 0, nearest first.
     pub(super) fn ball_cells(
         lattice: &Lattice,
         radius_m: f64,
@@ -78,12 +78,12 @@ impl Corridor {
         Ok(steps.into_iter().map(|step| step.by).collect())
     }
 
-    /// True if the ball fits in the middle of a cell.
+    /// Tests whether the ball fits at the centre of a cell.
     pub(super) fn is_clear(&self, store: &impl VoxelStore, w: LatticeIndex) -> bool {
         none_occupied(store, w, &self.at)
     }
 
-    /// True if the ball, which fits at both ends, fits between them too.
+    /// Tests whether the ball, which fits at both ends, fits between them.
     pub(super) fn is_way_clear(
         &self,
         store: &impl VoxelStore,

@@ -1,28 +1,28 @@
-//! Errors in questions to a map.
+//! Errors of map queries.
 
 use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::MAX_COORDINATE_M;
 
-/// Error in a question.
+/// Error of a query.
 #[derive(Clone, PartialEq, Debug, Error)]
 pub enum QueryError {
-    /// A coordinate or extent is not a number or beyond [`MAX_COORDINATE_M`].
+    /// Coordinate or extent that is not finite or exceeds [`MAX_COORDINATE_M`].
     #[error("point or extent {0:?} m is not finite or beyond {MAX_COORDINATE_M} m")]
     Point([f64; 3]),
-    /// The minimum of a box exceeds its maximum.
+    /// Box whose minimum exceeds its maximum.
     #[error("box with extents {0:?} m is inside out")]
     Box([f64; 3]),
-    /// A distance is not a number or negative.
+    /// Negative or NaN distance.
     #[error("distance {0} m is not 0 or more")]
     Distance(f64),
-    /// A path has no points.
-    #[error("a path needs at least one point")]
+    /// Path without points.
+    #[error("path without points: at least 1 is needed")]
     EmptyPath,
 }
 
-/// Fails for what is not finite or too far away.
+/// Rejects coordinates that are not finite or too large.
 pub(super) fn check_point(point_m: &Vector3<f64>) -> Result<(), QueryError> {
     let near = |x: &f64| x.abs() <= MAX_COORDINATE_M;
     if point_m.iter().all(near) {
@@ -32,7 +32,7 @@ pub(super) fn check_point(point_m: &Vector3<f64>) -> Result<(), QueryError> {
     }
 }
 
-/// Fails for a NaN or negative distance; infinity is fine.
+/// Rejects NaN or negative distances; infinity is accepted.
 pub(super) fn check_distance(distance_m: f64) -> Result<(), QueryError> {
     if distance_m >= 0.0 {
         Ok(())

@@ -1,18 +1,20 @@
-//! Distance between convex shapes: Gilbert, Johnson & Keerthi 1988, with sub-simplices found by trying
-//! all of them, which is slower than Johnson's recursion but never fooled by flat ones.
+//! Distance between convex shapes (Gilbert, Johnson & Keerthi 1988).
+//!
+//! Sub-simplices are found by exhaustive tests, which are slower than Johnson's recursion but robust against flat
+//! ones.
 
 use nalgebra::Vector3;
 
 /// Relative error of the squared distance at which the iteration stops.
 const PRECISION: f64 = 1e-13;
-/// Distances below this fraction of the size of the shapes are contact.
+/// Distance relative to the size of the shapes below which they are in contact.
 const CONTACT: f64 = 1e-12;
-/// Far beyond what polytopes need.
+/// Maximum number of iterations, far above what polytopes need.
 const MAX_STEPS: usize = 100;
 
 /// Distance between two convex shapes, 0 if they touch or overlap.
 ///
-/// `support` gives the point of the difference of the shapes (all a - b) farthest in a direction.
+/// `support` returns the point of the difference of the shapes (all a - b) farthest in a direction.
 pub(super) fn distance_m(support: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> f64 {
     let mut simplex = Simplex::default();
     simplex.push(support(&Vector3::x()));
@@ -63,7 +65,7 @@ impl Simplex {
         rest
     }
 
-    /// The smallest part of the simplex that holds its point nearest to 0, and that point.
+    /// Smallest sub-simplex that contains its point nearest to 0, and that point.
     fn nearest_to_origin(&self) -> (Simplex, Vector3<f64>) {
         let [a, b, c, d] = self.points;
         let inner = match self.len {
@@ -86,14 +88,14 @@ impl Simplex {
     }
 }
 
-/// The point of the line nearest to 0, if it is between its ends.
+/// Point of the line nearest to 0, if it is between the ends.
 fn nearest_in_line(a: Vector3<f64>, b: Vector3<f64>) -> Option<Vector3<f64>> {
     let along = b - a;
     let t = -a.dot(&along) / along.norm_squared();
     (t > 0.0 && t < 1.0).then(|| a + along * t)
 }
 
-/// The point of the plane nearest to 0, if it is in the triangle and the triangle is not flat.
+/// Point of the plane nearest to 0, if it is in the triangle and the triangle is not flat.
 fn nearest_in_triangle(a: Vector3<f64>, b: Vector3<f64>, c: Vector3<f64>) -> Option<Vector3<f64>> {
     let (ab, ac) = (b - a, c - a);
     let normal = ab.cross(&ac);
@@ -105,7 +107,7 @@ fn nearest_in_triangle(a: Vector3<f64>, b: Vector3<f64>, c: Vector3<f64>) -> Opt
     (inside(a, b) && inside(b, c) && inside(c, a)).then(|| normal * (a.dot(&normal) / area_squared))
 }
 
-/// False for a flat tetrahedron.
+/// Tests whether 0 is inside the tetrahedron; false for a flat one.
 fn origin_in_tetrahedron(
     a: Vector3<f64>,
     b: Vector3<f64>,
@@ -118,7 +120,7 @@ fn origin_in_tetrahedron(
     if volume.abs() <= 1e-12 * size {
         return false;
     }
-    // 0 is on the same side of each face as the fourth corner.
+    // 0 is on the same side of each face as the opposite corner.
     let same_side = |p: Vector3<f64>, q: Vector3<f64>, r: Vector3<f64>, apex: Vector3<f64>| {
         let normal = (q - p).cross(&(r - p));
         normal.dot(&(apex - p)) * -normal.dot(&p) >= 0.0

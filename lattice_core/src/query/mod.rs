@@ -1,12 +1,11 @@
-//! Questions about the occupied voxels of any store: the nearest ones, the clearance of a shape, and
-//! the shortest way around them.
+//! Queries of the occupied voxels of a store: nearest cells, clearance and shortest paths.
 //!
-//! Everything is in the map frame, metres. Two distances are in use, by name:
-//! - `nearest` measures to the centres of occupied cells;
-//! - `clearance` measures to the cells themselves, convex polyhedra, which no point in them can beat.
+//! Everything is in the map frame, metres. Two distances are defined:
+//! - `nearest`: to the centres of occupied cells
+//! - `clearance`: to the cells themselves, convex polyhedra
 //!
-//! Answers are exact up to the rounding of f64, do not depend on the number of threads or on earlier
-//! questions, and go to the lower key where distances are equal.
+//! Results are exact up to the rounding of f64 and independent of the number of threads and of earlier queries. Of
+//! equal distances the lower key wins.
 
 mod center_tree;
 mod clearance;
@@ -39,30 +38,30 @@ pub use shells::Shells;
 use search::Search;
 use tree::Tree;
 
-/// Coordinates and distances beyond this are refused, metres: a thousand times the largest map.
+/// Maximum coordinate and distance, metres: a thousand times the largest map.
 pub const MAX_COORDINATE_M: f64 = 1e12;
 
-/// Questions about one state of a store.
+/// Queries of one state of a store.
 ///
-/// Points near the surface are answered by probing cells in order of distance. The first question
-/// that this cannot settle sorts the keys (8 bytes each, kept), after which a search in the octree
-/// that sorted Morton keys form answers in logarithmic time.
+/// Points near the surface are resolved by probing cells in order of distance. The first query that this cannot
+/// resolve sorts the keys (8 bytes each, kept). Later ones search the octree of the sorted Morton keys in logarithmic
+/// time.
 pub struct Query<'a, S> {
     store: &'a S,
     shells: Arc<Shells>,
     tree: OnceLock<Tree>,
-    /// See [`Query::prepare_nearest`]; none of more cells than it numbers.
+    /// See [`Query::prepare_nearest`]; `None` if the cells exceed 32-bit indices.
     prepared: OnceLock<Option<PreparedNearest>>,
 }
 
 impl<'a, S: VoxelStore> Query<'a, S> {
-    /// Questions about `store` as it is now.
+    /// Creates queries of the current state of `store`.
     pub fn new(store: &'a S) -> Query<'a, S> {
         Query::with_shells(store, Arc::new(Shells::new(store.lattice())))
     }
 
-    /// As [`Query::new`] with what [`Shells::new`] made of the same lattice earlier, which saves
-    /// a millisecond where the store changes between questions. Other shells are replaced.
+    /// Creates queries with [`Shells`] made earlier for the same lattice, which saves a millisecond if the store
+    /// changes between queries. Shells of another lattice are replaced.
     pub fn with_shells(store: &'a S, shells: Arc<Shells>) -> Query<'a, S> {
         let shells = if shells.are_of(store.lattice()) {
             shells
@@ -77,7 +76,7 @@ impl<'a, S: VoxelStore> Query<'a, S> {
         }
     }
 
-    /// The same with what [`Query::prepare_nearest`] gave of this state of the store.
+    /// Uses a tree from [`Query::prepare_nearest`] of this state of the store.
     pub fn with_prepared(self, prepared: PreparedNearest) -> Query<'a, S> {
         Query {
             prepared: OnceLock::from(Some(prepared)),
@@ -85,18 +84,18 @@ impl<'a, S: VoxelStore> Query<'a, S> {
         }
     }
 
-    /// The store that is asked.
+    /// Store of the queries.
     pub fn store(&self) -> &'a S {
         self.store
     }
 
-    /// The key of the cell that holds a point (map frame, metres), if it is occupied.
+    /// Key of the cell that contains a point (map frame, metres), if it is occupied.
     pub fn occupied(&self, point_m: &Vector3<f64>) -> Option<MortonKey> {
         let key = self.store.key_of(point_m)?;
         self.store.contains(key).then_some(key)
     }
 
-    /// Runs a search by whichever way suits; the answer is the same.
+    /// Runs a search by the faster method; the result is the same.
     fn run(&self, search: &mut impl Search) {
         let few = self.store.len() <= self.shells.len();
         if self.tree.get().is_none() && !few {
@@ -113,7 +112,7 @@ impl<'a, S: VoxelStore> Query<'a, S> {
             .get_or_init(|| Tree::new(self.store.lattice().clone(), self.store.sorted_keys()))
     }
 
-    /// A point of the map frame in the frame of the datum.
+    /// Converts a point from the map frame to the datum.
     fn local(&self, point_m: &Vector3<f64>) -> Result<Vector3<f64>, QueryError> {
         let local = point_m - self.store.datum_m();
         error::check_point(point_m)?;

@@ -1,4 +1,4 @@
-//! The k occupied cells nearest to a point.
+//! The `k` occupied cells nearest to a point.
 
 use std::collections::BinaryHeap;
 
@@ -10,20 +10,21 @@ use super::{Query, QueryError};
 use crate::lattice::MortonKey;
 use crate::voxels::VoxelStore;
 
-/// An occupied cell near a point.
+/// Occupied cell near a point.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Neighbor {
-    /// The cell.
+    /// Key of the cell.
     pub key: MortonKey,
-    /// Its centre, map frame, metres.
+    /// Centre of the cell, map frame, metres.
     pub center_m: Vector3<f64>,
     /// Distance of the centre from the point, metres.
     pub distance_m: f64,
 }
 
 impl<S: VoxelStore> Query<'_, S> {
-    /// Prepares for many questions about nearest cells by a k-d tree of all centres, in the time of some questions for each
-    /// hundred cells; `None` if there are more than 2^32. Answers stay the same.
+    /// Builds a k-d tree of all centres for many nearest-cell queries; `None` if there are more than 2^32 cells.
+    ///
+    /// It takes the time of some queries per hundred cells. Results do not change.
     pub fn prepare_nearest(&self) -> Option<PreparedNearest> {
         let new = || PreparedNearest::new(self.store.lattice(), self.store.sorted_keys());
         self.prepared.get_or_init(new).clone()
@@ -65,7 +66,8 @@ struct NearestSearch {
     local_m: Vector3<f64>,
     k: usize,
     max_m: f64,
-    /// At most k, the worst on top: the bits of the distance, which order as it does, and the key.
+    /// At most `k` cells, the farthest on top: the bits of the distance, which sort as the distance does, and the
+    /// key.
     found: BinaryHeap<(u64, MortonKey)>,
 }
 

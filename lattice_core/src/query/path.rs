@@ -14,17 +14,17 @@ use super::{Query, QueryError, Segment};
 use crate::lattice::MortonKey;
 use crate::voxels::VoxelStore;
 
-/// Cells that a step may lead to.
+/// Neighbours that a step may reach.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Steps {
-    /// Cells that share a face.
+    /// Neighbours that share a face.
     #[default]
     Face,
-    /// Cells that share a face, an edge or a vertex.
+    /// Neighbours that share a face, an edge or a vertex.
     Touching,
 }
 
-/// A box along the axes of the map frame, metres.
+/// Axis-aligned box in the map frame, metres.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Bounds {
     /// Lowest corner.
@@ -34,7 +34,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// True for points in the box or on its surface.
+    /// Tests whether a point is inside the box or on its surface.
     pub fn contains(&self, point_m: &Vector3<f64>) -> bool {
         (0..3).all(|i| (self.min_m[i]..=self.max_m[i]).contains(&point_m[i]))
     }
@@ -58,71 +58,71 @@ impl Bounds {
     }
 }
 
-/// Options of a search for a path.
+/// Options of a path search.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PathOptions {
-    /// Radius of the ball that moves, metres.
+    /// Radius of the moving ball, metres.
     pub radius_m: f64,
-    /// Steps that it can take.
+    /// Allowed steps.
     pub steps: Steps,
-    /// Box that holds the centres of its cells, map frame; `None` for everywhere.
+    /// Box that contains the centres of the path's cells, map frame; `None` for no limit.
     pub bounds: Option<Bounds>,
-    /// The search gives up after this many cells.
+    /// Maximum number of expanded cells.
     pub max_expanded: usize,
 }
 
-/// A path from cell to cell.
+/// Path of cells.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Path {
-    /// The cells, from that of the start to that of the goal.
+    /// Cells from the start to the goal.
     pub keys: Vec<MortonKey>,
-    /// Their centres, map frame, metres.
+    /// Centres of the cells, map frame, metres.
     pub centers_m: Vec<Vector3<f64>>,
     /// Length from the first centre to the last, metres.
     pub length_m: f64,
-    /// Cells that the search looked around from.
+    /// Number of expanded cells.
     pub expanded: usize,
 }
 
-/// Failure of a search for a path.
+/// Failure of a path search.
 #[derive(Clone, PartialEq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum PathError {
-    /// The question makes no sense.
+    /// Invalid query.
     #[error(transparent)]
     Query(#[from] QueryError),
-    /// The ball is too large for the cells.
+    /// Ball too large for the cells.
     #[error(
         "radius {radius_m} m covers some {cells:.0} cells, at most {MAX_ROBOT_CELLS}: use larger cells"
     )]
     Radius { radius_m: f64, cells: f64 },
-    /// The start or goal is out of the bounds or of the range of keys.
+    /// Start or goal out of the bounds or of the range of keys.
     #[error("the cell of {end} {point_m:?} m is out of bounds")]
     OutOfBounds {
         end: &'static str,
         point_m: [f64; 3],
     },
-    /// The ball does not fit at the start or goal.
+    /// Ball that does not fit at the start or goal.
     #[error("the cell of {end} {point_m:?} m is not passable with radius {radius_m} m")]
     Blocked {
         end: &'static str,
         point_m: [f64; 3],
         radius_m: f64,
     },
-    /// Every cell that can be reached was looked at.
+    /// All reachable cells were expanded.
     #[error("no path: the goal is not among the {expanded} cells that can be reached")]
     NoPath { expanded: usize },
-    /// The search gave up.
+    /// The limit of expanded cells was reached.
     #[error("no path found among {expanded} cells: allow more, or set tighter bounds")]
     Limit { expanded: usize },
 }
 
 impl<S: VoxelStore> Query<'_, S> {
-    /// The shortest path along centres of cells on which a ball touches no occupied cell, neither at
-    /// the centres nor between them.
+    /// Finds the shortest path along cell centres on which a ball touches no occupied cell, neither at the centres
+    /// nor between them.
     ///
-    /// `start_m` and `goal_m` (map frame) stand for the cells that hold them. Paths of equal length
-    /// are chosen between by key, so that the same map gives the same path.
+    /// `start_m` and `goal_m` (map frame) select the cells that contain them. Of equally long paths the one with the
+    /// lowest keys is returned, so that the result is deterministic.
     pub fn shortest_path(
         &self,
         start_m: &Vector3<f64>,
@@ -132,8 +132,8 @@ impl<S: VoxelStore> Query<'_, S> {
         self.shortest_path_while(start_m, goal_m, options, || true)
     }
 
-    /// As [`Query::shortest_path`]; gives up as at the limit of cells once `go_on` says no, which is
-    /// asked before each cell that is looked around from.
+    /// As [`Query::shortest_path`], but stops as at the cell limit when `go_on` returns false, which is called before
+    /// each expansion.
     pub fn shortest_path_while(
         &self,
         start_m: &Vector3<f64>,
@@ -174,8 +174,8 @@ impl<S: VoxelStore> Query<'_, S> {
         let goal_center_m = lattice.center(goal.unpack());
         let to_goal_m = |key: MortonKey| (lattice.center(key.unpack()) - goal_center_m).norm();
         let mut cells = FxHashMap::default();
-        // Shortest in total first, then nearest to the goal, then lowest key, and with it the length
-        // on the way there; the bits of a distance order as it does.
+        // Sorted by total length, then distance to the goal, then key, with the length so far; the bits of a distance
+        // sort as the distance does.
         let mut waiting = BinaryHeap::new();
         let entry = |key: MortonKey, length_m: f64| {
             let to_goal_m = to_goal_m(key);
@@ -236,8 +236,8 @@ impl<S: VoxelStore> Query<'_, S> {
         Err(PathError::NoPath { expanded })
     }
 
-    /// Centre (map frame) of the cell in whose middle a ball fits and that is nearest to that of the
-    /// point, at most `within_m` from it; `None` if there is none.
+    /// Finds the centre (map frame) nearest to a point, at most `within_m` away, at which a ball fits; `None` if
+    /// there is none.
     pub fn nearest_passable(
         &self,
         point_m: &Vector3<f64>,
@@ -259,11 +259,10 @@ impl<S: VoxelStore> Query<'_, S> {
         Ok(keys.next().map(|key| self.store.center_m(key)))
     }
 
-    /// Takes corners out of a path where a straight line keeps a ball clear of occupied cells;
-    /// the ends stay, and the path gets no longer. Only occupied cells count, no other rule.
+    /// Shortens a path by straight segments that keep a ball clear of occupied cells; the ends stay.
     ///
-    /// Goes on from each point to the last one of the run that it sees, so that it takes as many
-    /// lines of sight as there are points.
+    /// Only occupied cells are tested. Each point is connected to the last visible one of its run, so that there are
+    /// as many visibility tests as points.
     pub fn shorten(
         &self,
         path_m: &[Vector3<f64>],
@@ -314,7 +313,7 @@ impl<S: VoxelStore> Query<'_, S> {
 enum Cell {
     /// The ball does not fit.
     Closed,
-    /// The ball fits, but no way there is known.
+    /// The ball fits, but no path to the cell is known.
     Open,
     Reached(Reached),
 }

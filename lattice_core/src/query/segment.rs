@@ -1,21 +1,21 @@
-//! Straight lines, whose clearance is asked for.
+//! Line segments, for clearance queries.
 
 use nalgebra::Vector3;
 
 use super::QueryError;
 use super::error::check_point;
 
-/// A straight line between two points of the map frame, metres; they may be equal.
+/// Line segment between two points of the map frame, metres; they may be equal.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Segment {
-    /// One end.
+    /// First end.
     pub from_m: Vector3<f64>,
-    /// The other end.
+    /// Second end.
     pub to_m: Vector3<f64>,
 }
 
 impl Segment {
-    /// A single point.
+    /// Creates a segment of one point.
     pub fn point(at_m: Vector3<f64>) -> Segment {
         Segment {
             from_m: at_m,
@@ -23,7 +23,7 @@ impl Segment {
         }
     }
 
-    /// The end that is farther in a direction (of any length).
+    /// End of the segment that is farther in a direction (of any length).
     pub(super) fn support_m(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         if (self.to_m - self.from_m).dot(direction) > 0.0 {
             self.to_m
@@ -32,7 +32,7 @@ impl Segment {
         }
     }
 
-    /// Centre and radius of a ball around the segment.
+    /// Centre and radius of the enclosing ball.
     pub(super) fn ball_m(&self) -> (Vector3<f64>, f64) {
         let half = 0.5 * (self.to_m - self.from_m);
         (self.from_m + half, half.norm())
@@ -50,7 +50,7 @@ impl Segment {
         check_point(&self.to_m)
     }
 
-    /// Distance to a point, with rounding.
+    /// Distance to a point, subject to rounding.
     pub(super) fn distance_m(&self, point_m: &Vector3<f64>) -> f64 {
         let along = self.to_m - self.from_m;
         let to_point = point_m - self.from_m;

@@ -1,4 +1,4 @@
-//! The cells around a cell in order of distance.
+//! Cells around a cell in order of distance.
 
 use nalgebra::Vector3;
 
@@ -6,10 +6,10 @@ use super::search::{Search, slack_m};
 use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
 
-/// About how many cells are probed before a search turns to sorted keys.
+/// Approximate number of probed cells before a search uses sorted keys.
 const PROBES: f64 = 4096.0;
 
-/// The cells around a cell in order of distance, some ten cell sides far.
+/// Index differences to the cells around a cell in order of distance, up to some ten cell sides.
 #[derive(Debug)]
 pub struct Shells {
     lattice: Lattice,
@@ -23,7 +23,7 @@ pub(super) struct Step {
 }
 
 impl Shells {
-    /// The shells of a lattice.
+    /// Creates the shells of a lattice.
     pub fn new(lattice: &Lattice) -> Shells {
         let ball_volume = PROBES * lattice.cell_volume_m3();
         let radius_m = (ball_volume * 0.75 * std::f64::consts::FRAC_1_PI).cbrt();
@@ -41,7 +41,7 @@ impl Shells {
         self.steps.len()
     }
 
-    /// Probes cells around the middle of the query; true if no other cell can matter.
+    /// Probes cells around the centre of the query; true if no other cell can matter.
     pub(super) fn search(&self, store: &impl VoxelStore, search: &mut impl Search) -> bool {
         let (middle, radius_m) = search.ball();
         let Some(start) = self.lattice.quantize(&middle) else {
@@ -69,7 +69,7 @@ pub(super) fn add(a: LatticeIndex, b: LatticeIndex) -> LatticeIndex {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// All lattice points within a distance of the lattice point 0, by distance, then by index.
+/// All lattice points within a distance of lattice point 0, by distance, then by index.
 pub(super) fn steps_within(lattice: &Lattice, radius_m: f64) -> Vec<Step> {
     let reach = dual(lattice).map(|row| (row.norm() * radius_m + 1e-9) as i32);
     let mut steps = Vec::new();
@@ -89,7 +89,7 @@ pub(super) fn steps_within(lattice: &Lattice, radius_m: f64) -> Vec<Step> {
     steps
 }
 
-/// Rows of the inverse generator: a lattice index is the products of its point with these.
+/// Rows of the inverse generator, which map a point to its lattice index.
 pub(super) fn dual(lattice: &Lattice) -> [Vector3<f64>; 3] {
     let g = lattice.generator();
     let columns = [0, 1, 2].map(|i| g.column(i).into_owned());

@@ -1,15 +1,15 @@
-//! The octree that sorted Morton keys form.
+//! Implicit octree of sorted Morton keys.
 
 use nalgebra::Vector3;
 
 use super::search::{Search, slack_m};
 use crate::lattice::{Lattice, MortonKey};
 
-/// Runs of at most this many keys are looked at one by one.
+/// Maximum size of a leaf.
 const LEAF: usize = 8;
 
-/// Sorted keys as an octree: a node of level l is a run of keys that agree but for 3 l bits, so that
-/// its centres lie in a parallelepiped of 2^l cells a side.
+/// Sorted keys as an octree: a node of level l is a run of keys that agree except for 3 l bits. Its centres lie in a
+/// parallelepiped of 2^l cells per side.
 pub(super) struct Tree {
     lattice: Lattice,
     keys: Vec<MortonKey>,
@@ -26,7 +26,7 @@ struct Node<'a> {
 }
 
 impl Tree {
-    /// The keys ascend.
+    /// Keys in ascending order.
     pub(super) fn new(lattice: Lattice, keys: Vec<MortonKey>) -> Tree {
         let g = lattice.generator();
         let diagonal = |y: f64, z: f64| (g * Vector3::new(1.0, y, z)).norm();
@@ -56,7 +56,7 @@ impl Tree {
         }
         let mut children: [Option<Node<'_>>; 8] = [None; 8];
         let mut rest = node.keys;
-        // The runs of children: keys that agree in the three bits below the node's level.
+        // Runs of children: keys that agree in the three bits below the node's level.
         for child in &mut children {
             let Some(first) = rest.first() else { break };
             let code = |key: &MortonKey| key.raw() >> (3 * node.level.saturating_sub(1));
@@ -77,7 +77,7 @@ impl Tree {
         }
     }
 
-    /// The smallest node with these keys, `None` without keys or out of reach.
+    /// Smallest node with these keys; `None` without keys or out of reach.
     fn node<'a>(&self, keys: &'a [MortonKey], search: &impl Search) -> Option<Node<'a>> {
         let (first, last) = (keys.first()?.raw(), keys.last()?.raw());
         let level = (u64::BITS - (first ^ last).leading_zeros()).div_ceil(3);

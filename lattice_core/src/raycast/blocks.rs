@@ -1,4 +1,4 @@
-//! Cells of known evidence, in blocks of 8 x 8 x 8 lattice indices.
+//! Log-odds of cells, in blocks of 8 x 8 x 8 lattice indices.
 
 use super::evidence::{Steps, UNKNOWN};
 use super::masks::{Mask, ScanMasks};
@@ -7,12 +7,12 @@ use crate::voxels::store::block_mask::bits;
 use crate::voxels::store::hash_table::{Row, Table};
 
 pub(super) const CELLS: usize = 512;
-/// Blocks that are allocated at once.
+/// Number of blocks allocated at once.
 const PAGE: usize = 64;
-/// In place of the slot of a block that is not there.
+/// Slot of a missing block.
 const NONE: u32 = u32::MAX;
 
-/// The packed index of the first cell of a block.
+/// Packed index of the first cell of a block.
 #[derive(Clone, Copy)]
 struct Block(u64);
 
@@ -23,25 +23,25 @@ impl Row for Block {
     }
 }
 
-/// Log-odds of cells, found by block.
+/// Log-odds of cells, looked up by block.
 #[derive(Clone)]
 pub(super) struct Blocks {
     table: Table<Block>,
     pages: Vec<Box<[[i8; CELLS]]>>,
     most: usize,
-    /// The slots of the blocks of a scan; kept to save the allocation.
+    /// Slots of the blocks of a scan; kept to save the allocation.
     slots: Vec<u32>,
 }
 
 impl Blocks {
-    /// Most memory for a block, bytes: cells, row, and slot of a scan twice for the growth of vectors.
+    /// Maximum memory per block, bytes: cells, row, and twice the slot of a scan for the growth of vectors.
     pub(super) const BYTES_PER_BLOCK: usize = CELLS + Table::<Block>::ROW_BYTES + 2 * 4;
 
     pub(super) fn new(most: usize) -> Blocks {
         Blocks {
             table: Table::new(),
             pages: Vec::new(),
-            // Whole pages, so that the last one is not half in vain.
+            // Whole pages, so that the last one is full.
             most: (most / PAGE * PAGE).min(NONE as usize),
             slots: Vec::new(),
         }
@@ -54,7 +54,7 @@ impl Blocks {
             + self.pages.len() * PAGE * CELLS
     }
 
-    /// The cells of a block, `None` if nothing is known of it.
+    /// Cells of a block; `None` if the block is unknown.
     pub(super) fn block(&self, block: u64) -> Option<&[i8; CELLS]> {
         self.cells(self.table.find(block)?)
     }
@@ -80,7 +80,7 @@ impl Blocks {
         self.pages.get_mut(slot / PAGE)?.get_mut(slot % PAGE)
     }
 
-    /// Adds a block that is not there, within the limit.
+    /// Adds a missing block, within the limit.
     fn add(&mut self, block: u64) -> u32 {
         let slot = self.table.len() as u32;
         let _ = self.table.find_or_add(block, self.most, || Block(block));
@@ -91,17 +91,17 @@ impl Blocks {
         slot
     }
 
-    /// Gives `update` the cells of each block with its masks. Blocks that are not there are added if
-    /// `wanted`; if they are too many, those with the lowest indices are, and the number of the
-    /// others is returned.
+    /// Calls `update` with the cells of each block and its masks.
+    ///
+    /// Missing blocks are added if `wanted`. Beyond the limit, those with the lowest indices are added; the number of
+    /// refused ones is returned.
     pub(super) fn apply<'a>(
         &mut self,
         scan: impl Iterator<Item = (u64, &'a Mask, &'a Mask)> + Clone,
         wanted: impl Fn(&Mask, &Mask) -> bool,
         mut update: impl FnMut(&mut [i8; CELLS], &Mask, &Mask),
     ) -> u64 {
-        // All look-ups first: they are independent of each other, so that they wait for the memory
-        // together.
+        // All lookups come first: they are independent, so their cache misses overlap.
         let mut slots = std::mem::take(&mut self.slots);
         slots.clear();
         let slot = |block: u64| self.table.find(block).unwrap_or(NONE);
@@ -137,8 +137,8 @@ impl Blocks {
     }
 }
 
-/// One hit for each cell of a scan that was hit, one miss for each other cell that was passed through
-/// and hit by an earlier one: for maps that keep no free cells. Returns the number of blocks refused.
+/// Adds one hit to each cell that a scan hit, and one miss to each other traversed cell that was hit before: for maps
+/// without free cells. Returns the number of refused blocks.
 pub(super) fn apply_to_hit(steps: &Steps, scan: &ScanMasks, cells: &mut Blocks) -> u64 {
     cells.apply(
         scan.blocks(),
@@ -156,7 +156,7 @@ pub(super) fn apply_to_hit(steps: &Steps, scan: &ScanMasks, cells: &mut Blocks) 
     )
 }
 
-/// One hit for each cell that was hit, one miss for each other cell that was passed through.
+/// Adds one hit to each cell that was hit, one miss to each other traversed cell.
 #[inline]
 pub(super) fn add_evidence(steps: &Steps, cells: &mut [i8; CELLS], passed: &Mask, hit: &Mask) {
     for (word, (&passed, &hit)) in passed.0.iter().zip(&hit.0).enumerate() {

@@ -1,4 +1,4 @@
-//! Removing voxels that rays pass through.
+//! Removing voxels that rays traverse.
 
 use rustc_hash::FxHashMap;
 
@@ -9,16 +9,16 @@ use super::traversal::Traversal;
 use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
 
-/// Conditions under which a voxel is removed.
+/// Conditions to remove a voxel.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ClearOptions {
-    /// Scans that must pass through a voxel, with none between that hits it, to remove it.
+    /// Number of scans without a hit in between that must traverse a voxel to remove it.
     pub misses: u32,
-    /// Parts of rays that remove voxels.
+    /// Range of the rays that clear.
     pub reach: Reach,
-    /// True: voxels that touch a cell which the scan hit are spared.
+    /// Keeps voxels that touch a cell hit by the scan.
     pub spare_touching: bool,
-    /// Most memory for the marks of a scan, bytes; cells beyond it are not cleared.
+    /// Maximum memory for the masks of a scan, bytes; cells beyond it are not cleared.
     pub max_bytes: usize,
 }
 
@@ -33,25 +33,24 @@ impl Default for ClearOptions {
     }
 }
 
-/// Voxels that a scan removed, and those that it passed through.
+/// Voxels that a scan traversed and removed.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct ClearReport {
-    /// The rays; `hits` and `misses` count cells whether they are occupied or not.
+    /// Counts of the scan; `hits` and `misses` include unoccupied cells.
     pub scan: ScanReport,
-    /// Occupied voxels that rays passed through and that nothing kept.
+    /// Number of occupied voxels that rays traversed, except kept ones.
     pub missed: u64,
-    /// Occupied voxels that rays passed through, kept since they touch a cell that the scan hit.
+    /// Number of occupied voxels that rays traversed, kept because they touch a hit cell.
     pub kept: u64,
-    /// The voxels that were removed, in ascending order.
+    /// Removed voxels in ascending order.
     pub removed: Vec<MortonKey>,
 }
 
-/// Removes from a store what rays pass through, for scenes in which things move.
+/// Clears voxels of a store that rays traverse, for dynamic scenes.
 ///
-/// A voxel is passed through if a ray to the lattice point of a cell with a point crosses it more
-/// than [`Reach::keep_m`] before that end. Voxels that the scan hits and, with `spare_touching`, those that
-/// touch one in at least a vertex are safe from it: a surface seen at a flat angle does not clear
-/// itself.
+/// A voxel is traversed if a ray to the lattice point of a hit cell crosses it more than [`Reach::keep_m`] before the
+/// end. Voxels that the scan hits are kept. With `spare_touching`, voxels that touch one in at least a vertex are
+/// kept too: a surface at a grazing angle does not clear itself.
 #[derive(Clone, Debug)]
 pub struct RayClearer {
     traversal: Traversal,
@@ -62,7 +61,7 @@ pub struct RayClearer {
 }
 
 impl RayClearer {
-    /// For stores of this lattice; use one for each store, since it counts misses.
+    /// Creates a clearer for stores of a lattice; each store needs its own, since it counts misses.
     pub fn new(lattice: &Lattice, options: ClearOptions) -> RayClearer {
         RayClearer {
             traversal: Traversal::new(lattice),
@@ -73,16 +72,14 @@ impl RayClearer {
         }
     }
 
-    /// Goes on with other conditions; the memory for marks stays as it is.
+    /// Sets other conditions; the memory for masks stays.
     pub fn set_options(&mut self, options: ClearOptions) {
         self.options = options;
     }
 
-    /// Clears along the rays of a scan. The points themselves are not inserted; do that before or
-    /// after.
+    /// Clears along the rays of a scan, whose points are inserted separately, before or after.
     ///
-    /// The outcome does not depend on the order of the points of a bundle. Nothing happens to a
-    /// store of another lattice than that of the clearer.
+    /// The result does not depend on the order of the points of a bundle. A store of another lattice is not changed.
     pub fn clear(&mut self, store: &mut dyn VoxelStore, scan: &[RayBundle]) -> ClearReport {
         let mut report = ClearReport::default();
         if *store.lattice() != self.traversal.lattice {
@@ -132,7 +129,7 @@ impl RayClearer {
         enough
     }
 
-    /// Forgets the misses of what the scan hits, and of what others have removed if it is much.
+    /// Drops the misses of hit voxels, and, if there are many, those of voxels removed elsewhere.
     fn forget_hits(&mut self, store: &dyn VoxelStore) {
         if self.missed.is_empty() {
             return;

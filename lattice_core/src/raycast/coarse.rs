@@ -11,20 +11,20 @@ use super::masks::{Cursor, Mask, ScanMasks};
 use super::packed::{Packed, difference};
 use crate::lattice::{Lattice, LatticeError, LatticeIndex, MortonKey};
 
-/// Relative to the cell side, how near cells count as overlapping.
+/// Tolerance of the overlap of cells, relative to the cell size.
 const SLACK: f64 = 1e-9;
 
 /// Log-odds of cells `2^level` as wide as those of the map, with the same lattice point 0.
 ///
-/// A lattice is its own sublattice of level 1, so that the coarse cell of a fine index `8 b + r` is
-/// that of `r` plus `8 b / 2^level`.
+/// A lattice is its own sublattice of level 1, so the coarse cell of a fine index `8 b + r` is that of `r` plus
+/// `8 b / 2^level`.
 #[derive(Clone)]
 pub(super) struct Coarse {
     lattice: Lattice,
     level: u32,
-    /// For each place of a fine block: the coarse cell that holds its lattice point.
+    /// Coarse cell that contains the lattice point, by position in a fine block.
     belongs: Vec<LatticeIndex>,
-    /// For each place of a fine block: all coarse cells that its cell may overlap.
+    /// Coarse cells that a cell may overlap, by position in a fine block.
     overlaps: Vec<Vec<LatticeIndex>>,
     masks: ScanMasks,
     cells: Blocks,
@@ -61,19 +61,19 @@ impl Coarse {
         self.masks.bytes() + self.cells.bytes()
     }
 
-    /// The coarse index of the first cell of a fine block.
+    /// Coarse index of the first cell of a fine block.
     fn base(&self, block: u64) -> LatticeIndex {
         Packed(block).unpack().map(|i| i >> self.level)
     }
 
-    /// The coarse cells that a fine cell may overlap.
+    /// Coarse cells that a fine cell may overlap.
     fn overlapped(&self, fine: Packed) -> impl Iterator<Item = Packed> + '_ {
         let base = self.base(fine.block());
         let around = self.overlaps.get(fine.place()).into_iter().flatten();
         around.filter_map(move |w| Packed::new(offset(base, *w)))
     }
 
-    /// Adds a scan: see [`super::FreeSpaceMap`]. Returns the number of blocks refused.
+    /// Adds a scan, see [`super::FreeSpaceMap`]; returns the number of refused blocks.
     pub(super) fn apply(&mut self, steps: &Steps, scan: &ScanMasks, fine: &mut Blocks) -> u64 {
         self.mark(scan);
         let fine_refused = apply_to_hit(steps, scan, fine);
@@ -87,7 +87,7 @@ impl Coarse {
         fine_refused + coarse_refused
     }
 
-    /// Marks the coarse cells of passed fine cells as passed, those that hit cells overlap as hit.
+    /// Marks coarse cells of traversed fine cells as traversed, and those overlapping hit cells as hit.
     fn mark(&mut self, scan: &ScanMasks) {
         self.masks.clear();
         let mut blocks: Vec<_> = scan.blocks().collect();
@@ -128,8 +128,9 @@ fn offset(a: LatticeIndex, b: LatticeIndex) -> LatticeIndex {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// All cells that a ball may overlap, from the one that holds its centre; a few more than do, none
-/// missing: a cell is left out only if one of its faces has the whole ball on the other side.
+/// Superset of the cells that a ball overlaps, starting with the one that contains its centre.
+///
+/// A cell is excluded only if the ball is entirely on the other side of one of its faces.
 fn overlapping(
     lattice: &Lattice,
     home: LatticeIndex,
@@ -146,7 +147,7 @@ fn overlapping(
     };
     let mut found = BTreeSet::from([home]);
     let mut open = vec![home];
-    // The cells that a ball overlaps hang together by faces.
+    // The cells that a ball overlaps are connected by faces.
     while let Some(w) = open.pop() {
         for n in faces {
             let next = offset(w, *n);

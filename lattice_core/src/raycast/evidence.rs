@@ -2,27 +2,27 @@
 
 use thiserror::Error;
 
-/// The log-odds of one step of a cell.
+/// Step of log-odds.
 const UNIT: f64 = 1.0 / 32.0;
 
-/// A cell of which nothing is known.
+/// Log-odds of an unknown cell.
 pub(super) const UNKNOWN: i8 = i8::MIN;
 
-/// Weights of hits and misses, as probabilities; the defaults are those of octomap.
+/// Sensor model: probabilities of hits and misses; the defaults are those of OctoMap.
 ///
-/// Log-odds `ln(p / (1 - p))` are kept in steps of 1/32, to which every value is rounded: with the
-/// defaults a hit adds 0.844, a miss takes 0.406, and cells stay within -2 and 3.5.
+/// Log-odds `ln(p / (1 - p))` are rounded to steps of 1/32. With the defaults a hit adds 0.844, a miss subtracts
+/// 0.406, and cells stay within -2 and 3.5.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Evidence {
-    /// Probability of an occupied cell given one hit, above 0.5.
+    /// Occupancy probability after one hit, above 0.5.
     pub hit: f64,
-    /// Probability of an occupied cell given one miss, below 0.5.
+    /// Occupancy probability after one miss, below 0.5.
     pub miss: f64,
-    /// No cell becomes less probable than this.
+    /// Minimum occupancy probability (clamping).
     pub least: f64,
-    /// No cell becomes more probable than this.
+    /// Maximum occupancy probability (clamping).
     pub most: f64,
-    /// Cells of at least this probability are occupied.
+    /// Occupancy threshold.
     pub threshold: f64,
 }
 
@@ -39,13 +39,13 @@ impl Default for Evidence {
 }
 
 impl Evidence {
-    /// Fails if the probabilities do not go together.
+    /// Validates the probabilities.
     pub fn check(&self) -> Result<(), EvidenceError> {
         Steps::new(self).map(|_| ())
     }
 }
 
-/// Probabilities that do not go together.
+/// Inconsistent probabilities.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 #[error(
     "hit {}, miss {}, least {}, most {}, threshold {}: all must be between 0.02 and 0.98, miss < 0.5 \
@@ -54,7 +54,7 @@ impl Evidence {
 )]
 pub struct EvidenceError(pub Evidence);
 
-/// The next value of a cell for each value that it may have.
+/// Next log-odds for each current value.
 #[derive(Clone, Debug)]
 pub(super) struct Steps {
     after_hit: [i8; 256],
@@ -103,7 +103,7 @@ impl Steps {
     }
 }
 
-/// `ln(p / (1 - p))` by the series of 2 atanh(2 p - 1), the same bits on every machine.
+/// `ln(p / (1 - p))` by the series of 2 atanh(2 p - 1), bit-identical on every machine.
 fn log_odds(p: f64) -> f64 {
     let x = 2.0 * p - 1.0;
     let (mut power, mut sum) = (x, 0.0);

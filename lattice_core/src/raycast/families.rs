@@ -1,39 +1,39 @@
-//! The planes between neighbouring cells, and the inner loop that walks through them.
+//! Planes between neighbouring cells, and the inner loop of the ray traversal.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::packed::{self, Packed};
 use crate::lattice::{Lattice, LatticeIndex};
 
-/// A numerator that is never reached: the plane of a family that the ray does not cross.
+/// Numerator of a family of planes that the ray does not cross.
 const NEVER: f64 = 1e300;
 
 /// Steps between two computations of the numerators from integers.
 const ANCHOR_STEPS: u64 = 512;
 
-/// Low bits of a parameter that say which face it belongs to.
+/// Low bits of a parameter that hold the face index.
 const TAG: u64 = 15;
 
-/// A face that is reached from here on is met at the end: the end decides on which side it is.
+/// Parameter from which a face counts as met at the end; the end decides the side.
 const LAST: f64 = 1.0 - 1.0 / (1_u64 << 48) as f64;
 
-/// A step along a ray slower than this part of a plane spacing is no crossing within the ray.
+/// Component of a ray per plane spacing below which it does not cross the planes.
 const PARALLEL: f64 = 1.0 / (1_u64 << 50) as f64;
 
 /// Change of state at the crossing of a face.
 #[derive(Clone, Copy, Debug)]
 struct Crossing<const P: usize> {
-    /// Added to the numerators: Gram products with the vector of the face.
+    /// Addend to the numerators: Gram products with the vector of the face.
     add: [f64; P],
-    /// Added to the packed lattice index.
+    /// Addend to the packed lattice index.
     step: u64,
 }
 
-/// The pairs of faces `+-n` of a cell, padded to `P`.
+/// Face pairs `+-n` of a cell, padded to `P`.
 ///
-/// For a ray `s + t d` in the cell of lattice point `c` the face `sigma n`, with `sigma` the sign of
-/// `n . d`, is reached at `t = q / (n . d)`, `q = sigma |n|^2 / 2 - n . (s - c)`. A crossing of face
-/// `k` adds the Gram products `sigma_k n . n_k` to all `q`.
+/// For a ray `s + t d` in the cell of lattice point `c`, the face `sigma n`, with `sigma` the sign of `n . d`, is
+/// reached at `t = q / (n . d)`, where `q = sigma |n|^2 / 2 - n . (s - c)`. A crossing of face `k` adds the Gram
+/// products `sigma_k n . n_k` to all `q`.
 #[derive(Clone, Debug)]
 pub(super) struct Families<const P: usize> {
     count: usize,
@@ -41,12 +41,12 @@ pub(super) struct Families<const P: usize> {
     half_squares: [f64; P],
     /// Gram products of each normal with the basis.
     with_basis: [Vector3<f64>; P],
-    /// For face `n_k` at `2 k`, for `-n_k` at `2 k + 1`.
+    /// Crossings: face `n_k` at `2 k`, `-n_k` at `2 k + 1`.
     crossings: [Crossing<P>; 16],
 }
 
 impl<const P: usize> Families<P> {
-    /// `faces` holds one vector of each pair; at most `P` and 8 count.
+    /// Creates the families from one vector of each pair; at most `P` and 8 are used.
     pub(super) fn new(generator: &Matrix3<f64>, faces: &[LatticeIndex]) -> Families<P> {
         let faces = faces.get(..faces.len().min(P).min(8)).unwrap_or_default();
         let mut normals = [Vector3::zeros(); P];
@@ -76,7 +76,7 @@ impl<const P: usize> Families<P> {
         }
     }
 
-    /// Starts of rays: `s - c` for a point `s` in the cell of lattice point `c`, at index `cell`.
+    /// Start of rays: `s - c` for a point `s` in the cell of lattice point `c`, at index `cell`.
     pub(super) fn origin(&self, from_center_m: Vector3<f64>, cell: Packed) -> Origin<P> {
         Origin {
             cell,
@@ -84,7 +84,7 @@ impl<const P: usize> Families<P> {
         }
     }
 
-    /// A ray from `origin` that ends at `t = 1` after `direction_m`.
+    /// Ray from `origin` that ends at `t = 1` after `direction_m`.
     #[inline(always)]
     pub(super) fn walk(&self, origin: &Origin<P>, direction_m: &Vector3<f64>) -> Walk<P> {
         let mut walk = Walk {
@@ -105,9 +105,9 @@ impl<const P: usize> Families<P> {
         walk
     }
 
-    /// One step of a ray: visits the cell that it leaves before `t = 1`; false at its end. Several
-    /// rays that take turns are faster than one after the other: a step of one waits for the step
-    /// before.
+    /// One step of a ray: visits the cell that it leaves before `t = 1`; false at its end.
+    ///
+    /// Several rays are interleaved, since each step of one depends on the one before.
     #[inline(always)]
     pub(super) fn step(
         &self,
@@ -129,7 +129,7 @@ impl<const P: usize> Families<P> {
         true
     }
 
-    /// Goes through the face whose tag `t` carries.
+    /// Crosses the face whose tag `t` carries.
     #[inline(always)]
     fn cross(&self, walk: &mut Walk<P>, t: f64) {
         let crossing = &self.crossings[(t.to_bits() & TAG) as usize];
@@ -139,7 +139,7 @@ impl<const P: usize> Families<P> {
         walk.cell = walk.cell.plus(crossing.step);
     }
 
-    /// Computes the numerators anew from the integer index, so that their roundings do not add up.
+    /// Recomputes the numerators from the integer index, so that rounding errors do not accumulate.
     #[inline(never)]
     fn anchor(&self, origin: &Origin<P>, walk: &mut Walk<P>) {
         let (from, at) = (origin.cell.unpack(), walk.cell.unpack());
@@ -158,7 +158,7 @@ impl<const P: usize> Families<P> {
     }
 }
 
-/// A start of rays: its cell and its offset from the lattice point along each normal.
+/// Start of rays: its cell and its offset from the lattice point along each normal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Origin<const P: usize> {
     pub(super) cell: Packed,
@@ -173,17 +173,17 @@ pub(super) struct Walk<const P: usize> {
     pub(super) cell: Packed,
 }
 
-/// A ray that takes turns with others.
+/// Interleaved ray.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ray<const P: usize> {
     pub(super) walk: Walk<P>,
     pub(super) steps: u64,
-    /// Steps that are surely enough.
+    /// Upper bound of the steps.
     pub(super) limit: u64,
 }
 
 impl<const P: usize> Walk<P> {
-    /// The parameter at which the ray leaves its cell; its low bits are the number of the face.
+    /// Parameter at which the ray leaves its cell; its low bits are the face index.
     #[inline(always)]
     fn next_exit(&self) -> f64 {
         let mut t = [0.0; P];
@@ -191,7 +191,7 @@ impl<const P: usize> Walk<P> {
             let exact = self.q[j] * self.inverse[j];
             *t = f64::from_bits(exact.to_bits() & !TAG | self.tag[j]);
         }
-        // Two lanes down to the end, so that SSE2 does it.
+        // Two lanes throughout, so that SSE2 suffices.
         let mut least = [t[0], t[1]];
         for pair in t.chunks_exact(2).skip(1) {
             least = [lesser(least[0], pair[0]), lesser(least[1], pair[1])];
@@ -200,7 +200,7 @@ impl<const P: usize> Walk<P> {
     }
 }
 
-/// The lesser of two numbers, one instruction.
+/// Minimum of two numbers in one instruction.
 #[inline(always)]
 fn lesser(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }

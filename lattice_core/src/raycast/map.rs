@@ -1,4 +1,4 @@
-//! The map of free space.
+//! Map of free space.
 
 use nalgebra::Vector3;
 
@@ -6,29 +6,30 @@ use super::blocks::{Blocks, add_evidence, apply_to_hit};
 use super::clear::ClearReport;
 use super::coarse::Coarse;
 use super::evidence::{Evidence, Steps, UNKNOWN};
+use super::free_space_options::{FreeSpaceError, FreeSpaceOptions};
 use super::masks::{Cursor, Mask, ScanMasks};
-use super::options::{FreeSpaceError, FreeSpaceOptions};
 use super::packed::Packed;
 use super::scan::{self, RayBundle, Reach, ScanReport};
 use super::traversal::Traversal;
 use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::{DatumError, VoxelStore};
 
-/// Cells that are marked at once where many are known to be occupied; bounds the memory for it.
+/// Cells marked at once when many are known to be occupied; bounds the memory.
 const SEED_CELLS: usize = 1 << 14;
 
-/// The occupied, free and unknown cells of a lattice, from scans with their origins.
+/// Occupancy map of a lattice (occupied, free, unknown) from scans with their origins.
 ///
-/// Each scan gives one hit to every cell that holds a point, and one miss to every other cell that a
-/// ray passes through before its end, however many rays do; one ray is followed to the lattice point
-/// of every cell that holds a point, through exactly the cells that it crosses. Evidence is in
-/// integers, so that the order of the points of a scan does not change a bit.
+/// Each scan adds one hit to every cell that contains a point, and one miss to every other cell that a ray traverses
+/// before its end, however many rays do. One ray goes to the lattice point of every hit cell, through exactly the
+/// cells that it crosses. Evidence is integer, so the order of the points of a scan does not change a bit.
 ///
-/// With `free_level` 0 every cell has its log-odds, a byte. With another only cells that were hit do,
-/// in blocks of 512; with a higher one free space is kept in the cells of a lattice `2^free_level` as
-/// wide, which has the same datum. A scan gives a coarse cell one miss if a ray of it passes through a fine
-/// cell that belongs to it and no fine cell that was hit overlaps it. A coarse cell is free if its
-/// log-odds are below the threshold and no occupied fine cell overlaps it.
+/// Free space depends on `free_level`:
+/// - 0: every cell has its log-odds, one byte.
+/// - none: only cells that were hit have log-odds, in blocks of 512.
+/// - above 0: free space is kept in the cells of a lattice `2^free_level` as wide with the same datum.
+///
+/// A coarse cell gets one miss per scan if a ray traverses a fine cell that belongs to it and no hit fine cell
+/// overlaps it. It is free if its log-odds are below the threshold and no occupied fine cell overlaps it.
 #[derive(Clone)]
 pub struct FreeSpaceMap {
     traversal: Traversal,
@@ -43,18 +44,17 @@ pub struct FreeSpaceMap {
 
 #[derive(Clone)]
 enum Free {
-    /// None but those that were hit.
+    /// Only cells that were hit.
     Hit,
-    /// Those of the map.
+    /// Cells of the map.
     Fine,
-    /// Wider ones.
+    /// Wider cells.
     Coarse(Box<Coarse>),
 }
 
 impl FreeSpaceMap {
-    /// An empty map with the datum at the lattice point nearest to `datum_near_m` (map frame,
-    /// metres), as that of a [`crate::voxels::VoxelList`] of the same lattice, so that both speak of
-    /// the same keys.
+    /// Creates an empty map with the datum at the lattice point nearest to `datum_near_m` (map frame, metres), as a
+    /// [`crate::voxels::VoxelList`] of the same lattice, so that their keys agree.
     pub fn new(
         lattice: Lattice,
         datum_near_m: Vector3<f64>,
@@ -65,8 +65,8 @@ impl FreeSpaceMap {
         let [x, y, z] = datum_near_m.into();
         let index = lattice.quantize_wide(&datum_near_m);
         let datum_index = index.ok_or(DatumError { x, y, z })?;
-        // A quarter of the memory is for the marks of one scan; with a free level half of everything
-        // is for the coarse lattice.
+        // A quarter of the memory is for the masks of one scan; with a free level, half of it is for the coarse
+        // lattice.
         let share = match options.free_level {
             None | Some(0) => options.max_bytes,
             Some(_) => options.max_bytes / 2,
@@ -89,11 +89,10 @@ impl FreeSpaceMap {
         })
     }
 
-    /// Adds a scan: one hit for each cell with a point, one miss for each other cell that a ray
-    /// passes through.
+    /// Adds a scan: one hit for each cell with a point, one miss for each other traversed cell.
     ///
-    /// The outcome does not depend on the order of the points of a bundle. Points that are not
-    /// finite or out of range are counted and left out; if the origin is, the bundle is.
+    /// The result does not depend on the order of the points of a bundle. Points that are not finite or out of range
+    /// are counted and dropped; if the origin is, the whole bundle.
     pub fn insert_scan(&mut self, scan: &[RayBundle]) -> ScanReport {
         let mut report = scan::mark(
             &self.traversal,
@@ -111,7 +110,7 @@ impl FreeSpaceMap {
         report
     }
 
-    /// Adds the marks of a scan; returns the number of blocks refused.
+    /// Adds the masks of a scan; returns the number of refused blocks.
     fn apply_marks(&mut self) -> u64 {
         let steps = &self.steps;
         match &mut self.free {
@@ -125,10 +124,10 @@ impl FreeSpaceMap {
         }
     }
 
-    /// Adds a scan whose points are in `store` already, and removes the voxels from it that the scan
-    /// has hit or passed through and that are not occupied by the evidence.
+    /// Adds a scan whose points are already in `store`, and removes from it the hit or traversed voxels that are not
+    /// occupied by the evidence.
     ///
-    /// Nothing happens to a store of another lattice or datum.
+    /// A store of another lattice or datum is not changed.
     pub fn clear(&mut self, store: &mut dyn VoxelStore, scan: &[RayBundle]) -> ClearReport {
         let mut report = ClearReport::default();
         if store.lattice() != self.lattice() || store.datum_index() != self.datum_index {
@@ -152,7 +151,7 @@ impl FreeSpaceMap {
         report
     }
 
-    /// Counts cells as hit once, such as those of a map that was loaded.
+    /// Adds one hit to each cell, such as those of a loaded map.
     pub fn insert_occupied(&mut self, keys: &[MortonKey]) {
         for part in keys.chunks(SEED_CELLS) {
             let mut cursor = Cursor::NONE;
@@ -164,16 +163,16 @@ impl FreeSpaceMap {
         }
     }
 
-    /// Forgets everything; keeps lattice, datum and options.
+    /// Clears the map; keeps lattice, datum and options.
     pub fn reset(&mut self) {
         let (lattice, options) = (self.lattice().clone(), self.options);
-        // A map that could be made once can be made again.
+        // A map that was created once can be created again.
         if let Ok(empty) = Self::new(lattice, self.datum_m, options) {
             *self = empty;
         }
     }
 
-    /// Goes on with other weights and reach; cells keep their evidence.
+    /// Sets another sensor model and range; cells keep their evidence.
     pub fn set_weights(&mut self, evidence: Evidence, reach: Reach) -> Result<(), FreeSpaceError> {
         self.steps = Steps::new(&evidence)?;
         (self.options.evidence, self.options.reach) = (evidence, reach);
@@ -185,8 +184,8 @@ impl FreeSpaceMap {
         self.sorted(|value| value >= self.steps.threshold)
     }
 
-    /// All free cells of [`FreeSpaceMap::free_lattice`] in ascending order; without a free level
-    /// those that were hit once.
+    /// All free cells of [`FreeSpaceMap::free_lattice`] in ascending order; without a free level only those that were
+    /// hit once.
     pub fn free_keys(&self) -> Vec<MortonKey> {
         match &self.free {
             Free::Hit | Free::Fine => self.sorted(|value| value < self.steps.threshold),
@@ -202,12 +201,12 @@ impl FreeSpaceMap {
         keys
     }
 
-    /// The lattice.
+    /// Lattice of the map.
     pub fn lattice(&self) -> &Lattice {
         &self.traversal.lattice
     }
 
-    /// The lattice of the free cells; its lattice point 0 is the datum, too.
+    /// Lattice of the free cells; its lattice point 0 is the datum too.
     pub fn free_lattice(&self) -> &Lattice {
         match &self.free {
             Free::Hit | Free::Fine => self.lattice(),
@@ -215,17 +214,17 @@ impl FreeSpaceMap {
         }
     }
 
-    /// The lattice point that keys count from, map frame, metres.
+    /// Datum: lattice point that keys count from, map frame, metres.
     pub fn datum_m(&self) -> Vector3<f64> {
         self.datum_m
     }
 
-    /// The options.
+    /// Options of the map.
     pub fn options(&self) -> &FreeSpaceOptions {
         &self.options
     }
 
-    /// Memory that the map holds, with what it keeps for the next scan, bytes; at most `max_bytes`.
+    /// Memory of the map including buffers for the next scan, bytes; at most `max_bytes`.
     pub fn bytes(&self) -> usize {
         let coarse = match &self.free {
             Free::Hit | Free::Fine => 0,

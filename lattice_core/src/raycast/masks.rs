@@ -1,11 +1,11 @@
-//! The cells that one scan hits and passes through.
+//! Cells that one scan hits and traverses.
 
 use std::hash::{BuildHasher, RandomState};
 
 use super::packed::Packed;
 use crate::voxels::store::block_mask::places;
 
-/// One bit for each cell of a block, a cache line.
+/// One bit per cell of a block, one cache line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(align(64))]
 pub(super) struct Mask(pub(super) [u64; 8]);
@@ -20,12 +20,12 @@ impl Mask {
         new
     }
 
-    /// The cells that are not in another mask.
+    /// Cells that are not in another mask.
     pub(super) fn without(&self, other: &Mask) -> Mask {
         Mask(std::array::from_fn(|word| self.0[word] & !other.0[word]))
     }
 
-    /// The cells of either mask.
+    /// Cells of either mask.
     pub(super) fn or(&self, other: &Mask) -> Mask {
         Mask(std::array::from_fn(|word| self.0[word] | other.0[word]))
     }
@@ -35,15 +35,15 @@ impl Mask {
     }
 }
 
-/// An odd multiplier, unknown to senders of points.
+/// Odd random multiplier, so that senders of points cannot force collisions.
 fn random_multiplier() -> u64 {
     RandomState::new().hash_one(0) | 1
 }
 
-/// The place of a hash in a table of a power of two.
+/// Slot of a hash in a table with a power of two of slots.
 #[inline(always)]
 fn spread(block: u64, multiplier: u64, bits: u32) -> usize {
-    // The low three bits of a block are zero, so that both halves need a turn.
+    // The low three bits of a block are zero, so both halves are rotated.
     let mixed = (block ^ block >> 32).wrapping_mul(multiplier);
     (mixed >> (64 - bits)) as usize
 }
@@ -52,18 +52,18 @@ fn spread(block: u64, multiplier: u64, bits: u32) -> usize {
 struct Entry {
     block: u64,
     slot: u32,
-    /// The entry is empty unless this is the stamp of the scan.
+    /// Stamp of the scan; the entry is empty if it differs.
     stamp: u32,
 }
 
-/// The blocks of one scan. Emptied in constant time.
+/// Blocks of one scan; cleared in constant time.
 #[derive(Clone, Debug)]
 pub(super) struct ScanMasks {
     table: Vec<Entry>,
     bits: u32,
     multiplier: u64,
     stamp: u32,
-    /// Slot 0 takes the cells of blocks that are refused.
+    /// Masks by slot; slot 0 collects the cells of refused blocks.
     blocks: Vec<u64>,
     passed: Vec<Mask>,
     hit: Vec<Mask>,
@@ -71,7 +71,7 @@ pub(super) struct ScanMasks {
     entries_refused: u64,
 }
 
-/// The block of the cell before; a ray stays in one for several cells.
+/// Block of the last cell; a ray stays in one for several cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cursor {
     block: u64,
@@ -79,7 +79,7 @@ pub(super) struct Cursor {
 }
 
 impl Cursor {
-    /// In no block: the low bits of a block are zero.
+    /// No block: the low bits of a block are zero.
     pub(super) const NONE: Cursor = Cursor { block: 1, slot: 0 };
 }
 
@@ -99,8 +99,8 @@ impl ScanMasks {
         }
     }
 
-    /// Most memory for a block, bytes: masks and block twice for the growth of vectors, and a table
-    /// filled to at least 3/8 beside the one that it grew from.
+    /// Maximum memory per block, bytes: twice masks and block for the growth of vectors, and a table at least 3/8
+    /// full beside the one that it replaces.
     pub(super) const BYTES_PER_BLOCK: usize = 2 * (2 * size_of::<Mask>() + 8) + 4 * 16;
 
     pub(super) fn bytes(&self) -> usize {
@@ -121,12 +121,12 @@ impl ScanMasks {
         }
     }
 
-    /// Rays and ends that came into a block that is not held, for want of memory.
+    /// Number of times that a ray or end entered a block refused for lack of memory.
     pub(super) fn entries_refused(&self) -> u64 {
         self.entries_refused
     }
 
-    /// Every block with what passed through and what was hit.
+    /// Every block with its traversed and its hit cells.
     pub(super) fn blocks(&self) -> impl Iterator<Item = (u64, &Mask, &Mask)> + Clone {
         let masks = self.passed.iter().zip(&self.hit);
         let blocks = self.blocks.iter().zip(masks).skip(1);
@@ -174,7 +174,7 @@ impl ScanMasks {
         }
     }
 
-    /// The slot of a block, new or not.
+    /// Slot of a block, created if missing.
     #[inline]
     fn enter(&mut self, block: u64) -> Cursor {
         let mask = self.table.len() - 1;

@@ -1,22 +1,22 @@
-//! Free space: which cells a ray passes through, and what scans say about them.
+//! Free space: traversal of rays through cells and occupancy evidence.
 //!
-//! Rays are followed through the cells of any lattice, exactly. [`FreeSpaceMap`] adds up scans to
-//! occupied, free and unknown cells, [`RayClearer`] removes from a voxel store what rays pass through.
+//! Rays are followed through the cells of any lattice, exactly. [`FreeSpaceMap`] accumulates scans to occupied, free
+//! and unknown cells. [`RayClearer`] removes voxels that rays traverse from a store.
 
 mod blocks;
 mod clear;
 mod coarse;
 mod evidence;
 mod families;
+mod free_space_options;
 mod map;
 mod masks;
-mod options;
 mod packed;
 mod scan;
 mod traversal;
 
 pub use clear::{ClearOptions, ClearReport, RayClearer};
 pub use evidence::{Evidence, EvidenceError};
+pub use free_space_options::{FreeSpaceError, FreeSpaceOptions, MAX_FREE_LEVEL, MIN_MAP_BYTES};
 pub use map::FreeSpaceMap;
-pub use options::{FreeSpaceError, FreeSpaceOptions, MAX_FREE_LEVEL, MIN_MAP_BYTES};
 pub use scan::{RayBundle, Reach, ScanReport};

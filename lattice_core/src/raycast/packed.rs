@@ -1,4 +1,4 @@
-//! A lattice index in one word, in a form that steps by one addition and splits into blocks.
+//! Lattice index in one word that steps by one addition and splits into blocks.
 
 use crate::lattice::{LatticeIndex, MortonKey};
 
@@ -6,7 +6,7 @@ const BITS: u32 = 21;
 const OFFSET: i64 = 1 << (BITS - 1);
 const FIELD: u64 = (1 << BITS) - 1;
 
-/// The low three bits of each axis: the place in a block of 8 x 8 x 8.
+/// Low three bits of each axis: the position in a block of 8 x 8 x 8.
 const PLACE: u64 = 7 | 7 << BITS | 7 << (2 * BITS);
 
 /// The three entries of a lattice index plus 2^20, 21 bits each, the first lowest.
@@ -14,7 +14,7 @@ const PLACE: u64 = 7 | 7 << BITS | 7 << (2 * BITS);
 pub(super) struct Packed(pub(super) u64);
 
 impl Packed {
-    /// `None` if an entry is outside of `-2^20 ..= 2^20 - 1`.
+    /// Packs an index; `None` if an entry is outside `-2^20 ..= 2^20 - 1`.
     #[inline]
     pub(super) fn new(w: LatticeIndex) -> Option<Packed> {
         let [x, y, z] = w.map(|i| (i64::from(i) + OFFSET) as u64);
@@ -26,26 +26,26 @@ impl Packed {
         [0, BITS, 2 * BITS].map(|shift| ((self.0 >> shift & FIELD) as i64 - OFFSET) as i32)
     }
 
-    /// The index `step` further, see [`difference`]; the caller keeps it in range.
+    /// Index advanced by `step`, see [`difference`]; the caller keeps it in range.
     #[inline(always)]
     pub(super) fn plus(self, step: u64) -> Packed {
         Packed(self.0.wrapping_add(step))
     }
 
-    /// The block that holds the index, as the packed index of its first cell.
+    /// Block that contains the index, as the packed index of its first cell.
     #[inline(always)]
     pub(super) fn block(self) -> u64 {
         self.0 & !PLACE
     }
 
-    /// The place in the block, below 512, the first axis fastest.
+    /// Position in the block, below 512, the first axis fastest.
     #[inline(always)]
     pub(super) fn place(self) -> usize {
         let v = self.0;
         ((v & 7) | (v >> (BITS - 3) & 0o70) | (v >> (2 * BITS - 6) & 0o700)) as usize
     }
 
-    /// The index at a place of a block.
+    /// Index at a position of a block.
     #[inline]
     pub(super) fn at(block: u64, place: usize) -> Packed {
         let p = place as u64;
@@ -58,7 +58,7 @@ impl Packed {
     }
 }
 
-/// A difference of indices as what is to be added to a packed index.
+/// Packs a difference of indices as an addend to a packed index.
 pub(super) fn difference(w: LatticeIndex) -> u64 {
     let [x, y, z] = w.map(i64::from);
     (x + (y << BITS) + (z << (2 * BITS))) as u64

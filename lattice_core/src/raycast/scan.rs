@@ -1,4 +1,4 @@
-//! The rays of a scan: one for each cell that they end in.
+//! Rays of a scan: one per cell that they end in.
 
 use nalgebra::Vector3;
 use rustc_hash::FxHashSet;
@@ -12,51 +12,51 @@ use crate::lattice::Simd;
 
 const LANES: usize = 4;
 
-/// Points that were seen from one place, in the map frame: a scan is one or more of these.
+/// Points seen from one position, in the map frame; a scan is one or more of these.
 #[derive(Clone, Copy, Debug)]
 pub struct RayBundle<'a> {
-    /// Position of the sensor, map frame, metres.
+    /// Sensor position, map frame, metres.
     pub origin_m: Vector3<f64>,
-    /// Ends of the rays.
+    /// End points of the rays.
     pub ends: &'a Cloud,
 }
 
 /// Numbers of points, rays and cells of a scan.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct ScanReport {
-    /// Points in the scan.
+    /// Number of points in the scan.
     pub points: u64,
-    /// Points with a coordinate that is NaN or infinite; all points of a bundle if its origin has one.
+    /// Points with a NaN or infinite coordinate; all points of a bundle if its origin has one.
     pub not_finite: u64,
-    /// Points too many cells from the datum; all points of a bundle if its origin is.
+    /// Points out of the range of keys; all points of a bundle if its origin is.
     pub out_of_range: u64,
     /// Points beyond the range limit, whose rays were followed up to it.
     pub beyond_max_range: u64,
     /// Cells that were hit.
     pub hits: u64,
-    /// Rays that were followed: one for each cell that one ends in.
+    /// Rays that were followed: one per end cell.
     pub rays: u64,
-    /// Cells passed through, counted anew for each ray.
+    /// Cells traversed, counted for each ray.
     pub visits: u64,
-    /// Cells passed through and not hit, each counted once.
+    /// Cells traversed and not hit, each counted once.
     pub misses: u64,
-    /// New blocks of 512 cells that there was no memory for.
+    /// New blocks of 512 cells refused for lack of memory.
     pub blocks_refused: u64,
-    /// Times that a ray or end came into a block that there was no memory for during the scan.
+    /// Number of times that a ray or end entered a block without memory during the scan.
     pub entries_refused: u64,
 }
 
-/// Parts of rays that count.
+/// Range of the rays.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Reach {
-    /// Rays of points that are farther than this are followed to this range, metres, and give no
-    /// hit; infinite for no limit.
+    /// Range limit, metres: rays of farther points end there without a hit; `INFINITY` for no limit.
     pub max_range_m: f64,
-    /// The last part of each ray, which passes through nothing, metres: rays that graze a surface
-    /// pass through the cells before the one that they end in.
+    /// Last part of each ray that clears nothing, metres: rays that graze a surface traverse the cells before the one
+    /// that they end in.
     pub keep_m: f64,
-    /// The same as a fraction of the ray, 0 to 1; the longer of the two counts. Ground seen at a flat
-    /// angle from a height is passed over, within its own cells, on a part of the way that grows with
+    /// Last part of each ray that clears nothing, as a fraction 0 to 1; the longer of the two applies.
+    ///
+    /// Ground seen at a grazing angle from a height is traversed, within its own cells, over a length that grows with
     /// the distance.
     pub keep_ratio: f64,
 }
@@ -71,17 +71,17 @@ impl Default for Reach {
     }
 }
 
-/// Cells where rays end, each once.
+/// End cells of rays, each once.
 pub(super) struct Ends {
     hits: Vec<Packed>,
-    /// Cells where the range limit cuts rays.
+    /// Cells in which the range limit ends rays.
     open: Vec<Packed>,
 }
 
-/// Marks the cells that a scan hits and passes through.
+/// Marks the cells that a scan hits and traverses.
 ///
-/// Rays go to the lattice points of the cells that they end in, so that the marks do not depend on
-/// the order of the points of a bundle. A cell that several bundles hit has a ray of the first.
+/// Rays go to the lattice points of their end cells, so the marks do not depend on the order of the points of a
+/// bundle. A cell hit by several bundles has a ray of the first.
 pub(super) fn mark(
     traversal: &Traversal,
     masks: &mut ScanMasks,
@@ -117,7 +117,7 @@ fn mark_bundles(bundles: &[Rays], masks: &mut ScanMasks, report: &mut ScanReport
     let ends = |rays: &Rays| rays.ends(masks, report);
     let mut ends: Vec<Ends> = bundles.iter().map(ends).collect();
     for ends in &mut ends {
-        // The same ray serves both.
+        // One ray serves both.
         ends.open.retain(|cell| !masks.is_hit(*cell));
     }
     let follow = |masks: &mut ScanMasks, ends: &[Ends]| -> u64 {
@@ -126,8 +126,7 @@ fn mark_bundles(bundles: &[Rays], masks: &mut ScanMasks, report: &mut ScanReport
     };
     report.visits = follow(masks, &ends);
     if masks.entries_refused() > 0 {
-        // The choice of refused blocks must not depend on the order of the points: once more, with
-        // ends that are complete and sorted.
+        // The choice of refused blocks must not depend on the order of the points: repeat with complete, sorted ends.
         masks.clear();
         let mut cursor = Cursor::NONE;
         for (rays, ends) in bundles.iter().zip(&mut ends) {
@@ -142,7 +141,7 @@ fn mark_bundles(bundles: &[Rays], masks: &mut ScanMasks, report: &mut ScanReport
     report.entries_refused = masks.entries_refused();
 }
 
-/// The rays of one bundle, in metres from the lattice point 0.
+/// Rays of one bundle, in metres from lattice point 0.
 struct Rays<'a> {
     traversal: &'a Traversal,
     origin_m: Vector3<f64>,
@@ -183,7 +182,7 @@ impl Rays<'_> {
         Ends { hits, open }
     }
 
-    /// The cells of all points within range, sorted.
+    /// Cells of all points within range, sorted.
     fn all_hits(&self) -> Vec<Packed> {
         let reach_square = self.reach.max_range_m * self.reach.max_range_m;
         let mut cells = Vec::new();
@@ -211,14 +210,14 @@ impl Rays<'_> {
     fn follow_all(&self, masks: &mut ScanMasks, ends: &Ends) -> u64 {
         #[cfg(target_arch = "x86_64")]
         if Simd::detect() == Simd::Avx2 {
-            // SAFETY: the machine has AVX2.
+            // SAFETY: AVX2 was detected.
             #[allow(unsafe_code)]
             return unsafe { self.follow_all_avx2(masks, ends) };
         }
         self.follow_all_portably(masks, ends)
     }
 
-    /// The same code with vectors of four; no fused multiply-add, so that no bit differs.
+    /// The same code compiled for AVX2, without fused multiply-add, so that the results are bit-identical.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     fn follow_all_avx2(&self, masks: &mut ScanMasks, ends: &Ends) -> u64 {

@@ -1,4 +1,4 @@
-//! The planes and bounds of a lattice by which rays are followed through its cells.
+//! Planes and bounds of a lattice for the traversal of its cells.
 
 use nalgebra::Vector3;
 
@@ -6,20 +6,19 @@ use super::families::{Families, face_pairs};
 use super::packed::Packed;
 use crate::lattice::{Lattice, LatticeIndex};
 
-/// A point where no ray can start or end.
+/// Reason that no ray can start or end at a point.
 pub(super) enum Outside {
     NotFinite,
-    /// Too many cells from the lattice point 0.
+    /// Too many cells from lattice point 0.
     OutOfRange,
 }
 
-/// Face neighbours of a lattice by which rays are followed through its cells, exactly.
+/// Face neighbours of a lattice for exact ray traversal.
 ///
-/// Within a cell the next face is the one that the ray reaches first, among the planes halfway to the
-/// face neighbours; there are at most 7 pairs. The numerators are sums of Gram products that are
-/// computed anew every 512 steps, so that a ray of `L` cell sides is followed to within some
-/// `600 L 2^-53` cell sides: cells that it crosses over a shorter length than that may be missing or
-/// be added, no others.
+/// Within a cell the next face is the first that the ray reaches among the planes halfway to the face neighbours;
+/// there are at most 7 pairs. The numerators are sums of Gram products, recomputed every 512 steps. A ray of `L` cell
+/// sizes is followed to within `600 L 2^-53` cell sizes: only cells crossed over a shorter length may be missed or
+/// added.
 #[derive(Clone, Debug)]
 pub(super) struct Traversal {
     pub(super) lattice: Lattice,
@@ -29,8 +28,8 @@ pub(super) struct Traversal {
     cells_at_ends: f64,
 }
 
-/// The families padded to a whole number of SIMD registers.
-// One for each traversal, which lives long: a box would save nothing.
+/// Families padded to a whole number of SIMD registers.
+// One per long-lived traversal: a box would save nothing.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
 pub(super) enum Kernel {
@@ -50,8 +49,8 @@ impl Traversal {
             5 | 6 => Kernel::Six(Families::new(&generator, &pairs)),
             _ => Kernel::Eight(Families::new(&generator, &pairs)),
         };
-        // The cells that touch a ray lie within the covering radius of it, their points within
-        // twice that: the volume of this capsule bounds their number.
+        // The cells that touch a ray lie within the covering radius of it, their points within twice that. The volume
+        // of this capsule bounds their number.
         let (reach, volume) = (2.0 * lattice.covering_radius_m(), lattice.cell_volume_m3());
         Traversal {
             index_limit: (1 << 20) - 4 * index_margin(lattice),
@@ -62,7 +61,7 @@ impl Traversal {
         }
     }
 
-    /// The cell of a point, if rays can start and end there.
+    /// Cell of a point, if rays can start and end there.
     pub(super) fn cell_of(&self, p_m: &Vector3<f64>) -> Result<Packed, Outside> {
         if !p_m.iter().all(|x| x.is_finite()) {
             return Err(Outside::NotFinite);
@@ -78,13 +77,13 @@ impl Traversal {
         (near(w[0]) & near(w[1]) & near(w[2])).then(|| Packed::new(w))?
     }
 
-    /// No ray of this length touches more cells.
+    /// Upper bound of the number of cells that a ray of this length touches.
     pub(super) fn most_steps(&self, length_m: f64) -> u64 {
         (self.cells_per_metre * length_m + self.cells_at_ends) as u64
     }
 }
 
-/// No cell of a point has an index that differs by more from the point's real-valued index.
+/// Upper bound of the difference between the index of a point's cell and the point's real-valued index.
 fn index_margin(lattice: &Lattice) -> i32 {
     let Some(inverse) = lattice.generator().try_inverse() else {
         return 1 << 19;

@@ -1,21 +1,21 @@
-//! Points with labels.
+//! Point cloud with label distributions.
 
 use nalgebra::Point3;
 
 use super::LabelDistribution;
 use crate::voxels::VoxelList;
 
-/// Points with what is known of their classes, in a frame that the holder names.
+/// Point cloud with label distributions, in a frame defined by its owner.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct SemanticCloud {
     /// Points, metres.
     pub points_m: Vec<Point3<f64>>,
-    /// Label distributions, one for each point, or none at all if nothing is known of any.
+    /// Label distributions: one per point, or none if the cloud is unlabelled.
     pub labels: Vec<LabelDistribution>,
 }
 
 impl SemanticCloud {
-    /// Points without labels.
+    /// Creates an unlabelled cloud.
     pub fn unlabelled(points_m: Vec<Point3<f64>>) -> SemanticCloud {
         SemanticCloud {
             points_m,
@@ -23,8 +23,7 @@ impl SemanticCloud {
         }
     }
 
-    /// The centroid of each voxel of a map with the shares of its labels, in the map frame, in the
-    /// order of the keys.
+    /// Creates a cloud of the voxel centroids of a map with the fractions of their labels, in key order.
     pub fn from_voxels(list: &VoxelList) -> SemanticCloud {
         let labelled = list.payload().labels;
         let mut cloud = SemanticCloud::default();
@@ -40,7 +39,7 @@ impl SemanticCloud {
         cloud
     }
 
-    /// Keeps the points of which something holds, with their labels.
+    /// Keeps the points for which `is_kept` is true, with their labels.
     pub fn retain(&mut self, is_kept: impl Fn(&Point3<f64>) -> bool) {
         let kept: Vec<bool> = self.points_m.iter().map(is_kept).collect();
         let mut of_point = kept.iter().copied();
@@ -55,7 +54,7 @@ impl SemanticCloud {
         self.points_m.len()
     }
 
-    /// True if there is no point.
+    /// Tests whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.points_m.is_empty()
     }

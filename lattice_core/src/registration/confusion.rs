@@ -1,4 +1,4 @@
-//! Co-occurrence of two segmenters' labels, learned while clouds are registered.
+//! Label co-occurrence of two segmenters, learned during registration.
 
 use std::collections::BTreeMap;
 
@@ -6,20 +6,20 @@ use serde::{Deserialize, Serialize};
 
 use super::{LabelDistribution, PreparedCloud};
 
-/// Observations that count as much as what is assumed beforehand.
+/// Weight of the prior, in observations.
 const PRIOR_MASS: f64 = 30.0;
-/// Bounds of the lift: no pair of labels settles a correspondence alone.
+/// Bounds of the lift, so that no pair of labels alone determines a correspondence.
 const MIN_LIFT: f64 = 0.05;
 const MAX_LIFT: f64 = 20.0;
-/// Most classes of one segmenter that are distinguished; further ones count as unknown.
+/// Maximum number of distinguished classes per segmenter; others count as unknown.
 const MAX_CLASSES: usize = 64;
-/// Observations remembered at most: older ones fade.
+/// Maximum number of kept observations; above it, all are scaled down.
 const MAX_MASS: f64 = 2_000.0;
 
-/// Counts of source and target classes that met in one place.
+/// Counts of corresponding source and target classes.
 ///
-/// The two may have different label sets. Kept between calibrations, it makes labels useful that
-/// disagree in a consistent way, and harmless if they do not agree at all.
+/// The label sets may differ. Accumulated over registrations, the counts make consistent disagreement informative and
+/// unrelated labels neutral.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct Confusion {
     /// Source class, target class, observations.
@@ -27,8 +27,7 @@ pub struct Confusion {
 }
 
 impl Confusion {
-    /// Next to no observations of every pair of classes that two clouds hold, by the shares of each, so
-    /// that their lift is what is assumed beforehand.
+    /// Co-occurrence with negligible observations of all class pairs of two clouds, whose lift is that of the prior.
     pub(super) fn unseen(source: &[(u16, f64)], target: &[(u16, f64)]) -> Confusion {
         let pairs = source
             .iter()
@@ -48,13 +47,13 @@ impl Confusion {
         &self.pairs
     }
 
-    /// True if the numbers are those of observations, for one that was read from a file.
+    /// Tests whether the counts are valid, for a table read from a file.
     pub fn is_valid(&self) -> bool {
         let finite = self.pairs.iter().all(|p| p.2 >= 0.0 && p.2.is_finite());
         finite && self.pairs.len() <= MAX_CLASSES * MAX_CLASSES && self.mass() < 1e12
     }
 
-    /// The observations of both; what is too much fades.
+    /// Sums the observations of both, scaled down to the maximum.
     pub fn merged(&self, other: &Confusion) -> Confusion {
         let mut sums = Counts::default();
         for (a, b, mass) in self.pairs.iter().chain(&other.pairs) {
@@ -68,10 +67,11 @@ impl Confusion {
         merged
     }
 
-    /// Share of a source class's observations that met the same class number; its observations.
+    /// Fraction of a source class's observations with the same target class number, and the number of its
+    /// observations.
     pub fn agreement(&self, class: u16) -> (f64, f64) {
         let of = |keep: &dyn Fn(&(u16, u16, f64)) -> bool| -> f64 {
-            // Not a sum, which is -0 where there is nothing.
+            // `sum` of nothing is -0.
             let kept = self.pairs.iter().filter(|p| keep(p));
             kept.fold(0.0, |sum, p| sum + p.2)
         };
@@ -80,11 +80,10 @@ impl Confusion {
         (if all > 0.0 { same / all } else { 0.0 }, all)
     }
 
-    /// The lift of each pair of classes:
-    /// P(a, b in one place) / (P(a) P(b)).
+    /// Lift of each pair of classes, P(a, b) / (P(a) P(b)) over correspondences.
     ///
-    /// `agreement` is the share of places where equal class numbers are expected beforehand, 0 if the
-    /// label sets have nothing to do with each other. Observations outweigh it.
+    /// `agreement` is the prior fraction of correspondences with equal class numbers; 0 if the label sets are
+    /// unrelated. Observations outweigh it.
     pub fn lift(&self, agreement: f64) -> Lift {
         let source = Classes::of(self.pairs.iter().map(|p| p.0));
         let target = Classes::of(self.pairs.iter().map(|p| p.1));
@@ -101,7 +100,7 @@ impl Confusion {
         let prior = |a: usize, b: usize| {
             let independent = p[a] * q[b];
             let equal = source.names[a] == target.names[b];
-            // As often as both classes are seen, if they are expected to be equal.
+            // Frequency of correspondences of equal classes if the label sets agree.
             agreement * if equal { p[a].min(q[b]) } else { 0.0 } + (1.0 - agreement) * independent
         };
         let priors: Vec<f64> = (0..rows * columns)
@@ -124,7 +123,7 @@ impl Confusion {
     }
 }
 
-/// Shares of the most frequent classes, in the order of their numbers.
+/// Fractions of the most frequent classes, in the order of their numbers.
 pub(super) fn shares(cloud: &PreparedCloud) -> Vec<(u16, f64)> {
     shares_of((0..cloud.len()).map(|i| cloud.label(i)))
 }
@@ -144,6 +143,7 @@ fn shares_of(labels: impl Iterator<Item = LabelDistribution>) -> Vec<(u16, f64)>
     shares
 }
 
+/// Row and column sums of a joint distribution, divided by `n`.
 fn marginals(joint: &[f64], rows: usize, columns: usize, n: f64) -> (Vec<f64>, Vec<f64>) {
     let mut p = vec![0.0; rows];
     let mut q = vec![0.0; columns];
@@ -154,11 +154,12 @@ fn marginals(joint: &[f64], rows: usize, columns: usize, n: f64) -> (Vec<f64>, V
     (p, q)
 }
 
+/// Accumulator of label co-occurrence.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Counts(BTreeMap<(u16, u16), f64>);
 
 impl Counts {
-    /// Adds a source and a target point seen in one place.
+    /// Adds a correspondence.
     pub fn add(&mut self, source: &LabelDistribution, target: &LabelDistribution, mass: f64) {
         for (a, p) in source.iter() {
             for (b, q) in target.iter() {
@@ -167,14 +168,14 @@ impl Counts {
         }
     }
 
-    /// These sums and others.
+    /// Adds other counts.
     pub fn add_all(&mut self, other: &Counts) {
         for (pair, mass) in &other.0 {
             *self.0.entry(*pair).or_default() += mass;
         }
     }
 
-    /// The observations, of the most frequent pairs if there are too many.
+    /// Converts to a [`Confusion`], limited to the most frequent pairs.
     pub fn confusion(self) -> Confusion {
         let pairs = self.0.into_iter().map(|((a, b), mass)| (a, b, mass));
         let mut pairs: Vec<(u16, u16, f64)> = pairs.collect();
@@ -187,11 +188,11 @@ impl Counts {
     }
 }
 
-/// Class numbers of one side and where each stands in a table.
+/// Class numbers of one side and their indices in a table.
 #[derive(Clone, Debug, Default)]
 struct Classes {
     names: Vec<u16>,
-    /// By class number: place in `names`, or `u8::MAX`.
+    /// Index in `names` by class number, or `u8::MAX`.
     places: Vec<u8>,
 }
 
@@ -215,7 +216,7 @@ impl Classes {
     }
 }
 
-/// Ratio of the share of two labels in one place to that by chance; 1 says nothing.
+/// Ratio of the joint probability of two labels to that of independent ones; 1 is neutral.
 #[derive(Clone, Debug, Default)]
 pub struct Lift {
     source: Classes,
@@ -224,7 +225,7 @@ pub struct Lift {
 }
 
 impl Lift {
-    /// Lift of two classes; 1 for a class that was never seen.
+    /// Lift of two classes; 1 for an unknown class.
     #[inline]
     pub fn of(&self, source: u16, target: u16) -> f64 {
         let at = self.source.index(source).zip(self.target.index(target));
@@ -232,7 +233,7 @@ impl Lift {
         at.copied().unwrap_or(1.0)
     }
 
-    /// Expected lift of two distributions; what is unknown counts 1.
+    /// Expected lift of two distributions; the unknown part counts 1.
     #[inline]
     pub fn expected(&self, source: &LabelDistribution, target: &LabelDistribution) -> f64 {
         let (mut known, mut sum) = (0.0, 0.0);
@@ -264,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_that_have_nothing_to_do_with_each_other_say_nothing() {
+    fn unrelated_labels_are_neutral() {
         let pairs: Vec<_> = [1, 2, 3]
             .into_iter()
             .flat_map(|a| [7, 8].map(|b| (a, b, f64::from(a) * f64::from(b) * 10.0)))

@@ -4,15 +4,16 @@ use nalgebra::{Point3, Vector3};
 
 use super::{LabelDistribution, SemanticCloud, UNLABELED};
 
-/// Cells are numbered from minus to plus this along each axis.
-const MOST: f64 = (1 << 20) as f64;
-/// Distance of a cloud's median from the origin, in cells, from which on they are numbered from there.
-const FAR: f64 = MOST / 2.0;
+/// Largest absolute cell index along each axis.
+const MAX_INDEX: f64 = (1 << 20) as f64;
+/// Distance of the median of a cloud from the origin from which indices start at the median, in cells.
+const FAR: f64 = MAX_INDEX / 2.0;
 
-/// The mean point and the mean label distribution of each cubic cell, in the order of the cells.
+/// Mean point and mean label distribution of each cubic cell, in the order of the cells.
 ///
-/// Cells have a corner at the origin, as those of small_gicp's `voxelgrid_sampling`. Points that are not
-/// finite or over a million cells away, from the origin or from the median of a cloud that is far from it, are left out; a side that is not over 0 leaves all as it is.
+/// Cells have a corner at the origin, as in small_gicp's `voxelgrid_sampling`. Indices start at the median of the
+/// cloud if it is far from the origin. Points that are not finite or beyond 2^20 cells are dropped. The cloud is
+/// returned unchanged if `cell_side_m` is not positive.
 pub fn voxel_downsample(cloud: &SemanticCloud, cell_side_m: f64) -> SemanticCloud {
     if cell_side_m.is_nan() || cell_side_m <= 0.0 {
         return cloud.clone();
@@ -20,8 +21,8 @@ pub fn voxel_downsample(cloud: &SemanticCloud, cell_side_m: f64) -> SemanticClou
     let first = first_cell(cloud, cell_side_m);
     let cell = |(index, p): (usize, &Point3<f64>)| {
         let w = p.coords.map(|c| (c / cell_side_m).floor()) - first;
-        let near = w.iter().all(|w| w.abs() < MOST);
-        let [x, y, z] = [w.x, w.y, w.z].map(|w| (w + MOST) as u64);
+        let near = w.iter().all(|w| w.abs() < MAX_INDEX);
+        let [x, y, z] = [w.x, w.y, w.z].map(|w| (w + MAX_INDEX) as u64);
         near.then_some((z << 42 | y << 21 | x, index))
     };
     let points = cloud.points_m.iter().enumerate();
@@ -38,7 +39,7 @@ pub fn voxel_downsample(cloud: &SemanticCloud, cell_side_m: f64) -> SemanticClou
     thinned
 }
 
-/// The cell from which others are numbered: that of the origin, or along an axis on which the median is far that of it.
+/// Origin of the cell indices: zero, or the cell of the median along axes on which it is far.
 fn first_cell(cloud: &SemanticCloud, cell_side_m: f64) -> Vector3<f64> {
     Vector3::from_fn(|axis, _| {
         let coordinate = |p: &Point3<f64>| p.coords.get(axis).copied();
@@ -50,7 +51,7 @@ fn first_cell(cloud: &SemanticCloud, cell_side_m: f64) -> Vector3<f64> {
         }
         let (_, median, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
         let cell = (*median / cell_side_m).floor();
-        // Beyond 2^53 cells neighbours are no longer told apart.
+        // Beyond 2^53 cells, adjacent cells are not distinguished.
         let is_far = cell.abs() >= FAR && cell.abs() < 9e15;
         if is_far { cell } else { 0.0 }
     })

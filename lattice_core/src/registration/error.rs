@@ -1,33 +1,33 @@
-//! Errors of clouds that cannot be registered.
+//! Errors of the preparation of clouds for registration.
 
 use thiserror::Error;
 
-/// A cloud that cannot be prepared for registration.
+/// Reason that a cloud cannot be prepared for registration.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum RegistrationError {
-    /// Too few points for the neighbourhoods asked for.
-    #[error("{points} points, at least {least} are needed")]
+    /// Fewer points than a neighbourhood needs.
+    #[error("point count {points} is below {least}")]
     TooFewPoints { points: usize, least: usize },
-    /// More points than can be numbered.
-    #[error("{points} points, at most {most} are taken")]
+    /// More points than an index can number.
+    #[error("point count {points} is above {most}")]
     TooManyPoints { points: usize, most: usize },
-    /// A coordinate is not a number or beyond [`MAX_COORDINATE_M`](super::MAX_COORDINATE_M).
-    #[error("point {index} is not finite or too far away")]
+    /// A coordinate is not finite or exceeds [`MAX_COORDINATE_M`](super::MAX_COORDINATE_M).
+    #[error("point {index} has a coordinate that is not finite or beyond 1e8 m")]
     NotFinite { index: usize },
-    /// All points are equal or on one line, up to rounding.
-    #[error("all points are on one line")]
+    /// All points are equal or collinear, up to rounding.
+    #[error("all points are collinear")]
     Collinear,
-    /// There must be a label for each point or none at all.
-    #[error("{labels} labels for {points} points")]
+    /// Neither one label per point nor none.
+    #[error("label count {labels} differs from point count {points}")]
     LabelCount { labels: usize, points: usize },
-    /// Neighbours of a neighbourhood out of range.
-    #[error("{neighbors} neighbours, from 3 to {most} are taken")]
+    /// Size of a neighbourhood out of range.
+    #[error("neighbour count {neighbors} is outside 3..={most} (`neighbors`)")]
     Neighbors { neighbors: usize, most: usize },
-    /// The plane regularisation must be over 0 and at most 1.
-    #[error("a plane epsilon of {plane_epsilon} is not in (0, 1]")]
+    /// Plane regularization out of range.
+    #[error("plane epsilon {plane_epsilon} is outside (0, 1] (`plane_epsilon`)")]
     PlaneEpsilon { plane_epsilon: f64 },
-    /// The side of a map's cells is not a length.
-    #[error("a cell side of {cell_side_m} m is not a positive length")]
+    /// Cell size of a map out of range.
+    #[error("cell size {cell_side_m} m is not positive and finite")]
     CellSide { cell_side_m: f64 },
 }

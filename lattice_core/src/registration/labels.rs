@@ -3,11 +3,12 @@
 /// Class number of a point without a label, as in `vision_msgs/LabelInfo`.
 pub const UNLABELED: u16 = u16::MAX;
 
+/// Number of stored classes.
 const KEPT: usize = 4;
 
-/// Probabilities of the most probable classes of a point; what is missing to one is unknown.
+/// Probabilities of the most probable classes of a point; the remainder to 1 is unknown.
 ///
-/// Class numbers are those of one segmenter; two clouds may use different sets.
+/// Class numbers are those of one segmenter; two clouds may use different label sets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LabelDistribution {
     classes: [u16; KEPT],
@@ -21,16 +22,16 @@ impl LabelDistribution {
         weights: [0.0; KEPT],
     };
 
-    /// One class for sure; unknown for [`UNLABELED`].
+    /// Distribution of one class with probability 1; unknown for [`UNLABELED`].
     pub fn hard(class: u16) -> LabelDistribution {
         LabelDistribution::from_weights([(class, 1.0)])
     }
 
-    /// The four largest of weights that are divided by their sum, if it is more than one.
+    /// Distribution of the four largest weights, normalized if their sum exceeds 1.
     ///
-    /// Weights that are not positive and finite, and the class [`UNLABELED`], are left out of the
-    /// classes; a positive weight of [`UNLABELED`] counts in the sum. Each class comes once. Of equal
-    /// weights the first come first.
+    /// Weights that are not positive and finite, and the class [`UNLABELED`], are excluded from the classes; a
+    /// positive weight of [`UNLABELED`] counts in the sum. Each class occurs once. Of equal weights, the first come
+    /// first.
     pub fn from_weights(weights: impl IntoIterator<Item = (u16, f32)>) -> LabelDistribution {
         let mut kept = LabelDistribution::UNKNOWN;
         let mut sum = 0.0;
@@ -48,7 +49,7 @@ impl LabelDistribution {
         kept
     }
 
-    /// Puts a class where its weight belongs and drops the least.
+    /// Inserts a class by descending weight and drops the smallest.
     fn place(&mut self, mut class: u16, mut weight: f32) {
         for i in 0..KEPT {
             if weight > self.weights[i] {
@@ -64,7 +65,7 @@ impl LabelDistribution {
         pairs.take_while(|(_, weight)| *weight > 0.0)
     }
 
-    /// The most probable class.
+    /// Most probable class.
     pub fn top(&self) -> Option<u16> {
         self.iter().next().map(|(class, _)| class)
     }

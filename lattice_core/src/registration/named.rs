@@ -1,19 +1,19 @@
-//! The table of registration methods: their names in commands, files of results and reports.
+//! Table of the registration methods and their names in commands, result files and reports.
 
 use super::{LabelUse, RegisterOptions, SemanticVariant};
 
-/// A registration method with its names.
+/// Registration method with its names.
 #[derive(Clone, Copy, Debug)]
 pub struct NamedMethod {
-    /// Name in files of results.
+    /// Name in result files.
     pub name: &'static str,
     /// Value of `--method`.
     pub option: &'static str,
-    /// Name in tables and keys of pictures.
+    /// Name in tables and figure legends.
     pub title: &'static str,
     /// One line of help.
     pub help: &'static str,
-    /// True if the options take the gate that they are given; the others have a published one.
+    /// True if the gate is a parameter; the other methods have a published gate.
     pub takes_gate: bool,
     options: fn(f64) -> RegisterOptions<'static>,
 }
@@ -95,12 +95,12 @@ impl NamedMethod {
         },
     ];
 
-    /// The method of a name in files of results.
+    /// Method with the given name in result files.
     pub fn named(name: &str) -> Option<&'static NamedMethod> {
         Self::ALL.iter().find(|method| method.name == name)
     }
 
-    /// Options with a gate in metres where none is published.
+    /// Options of the method; `gate_m` applies if no gate is published.
     pub fn options(&self, gate_m: f64) -> RegisterOptions<'static> {
         (self.options)(gate_m)
     }

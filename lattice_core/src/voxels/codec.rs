@@ -1,7 +1,7 @@
 //! Sorted keys as bytes: LEB128 varints of the differences, the first key absolute.
 //!
-//! A varint holds seven bits a byte, lowest first; the top bit says that more follow. Only the
-//! shortest form is accepted, so that a list of keys has one encoding.
+//! A varint has seven bits per byte, lowest first; the top bit marks a continuation. Only the shortest form is
+//! accepted, so that a list of keys has one encoding.
 
 use thiserror::Error;
 
@@ -11,13 +11,13 @@ use crate::lattice::MortonKey;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum CodecError {
-    /// The bytes end within a varint.
+    /// Bytes that end within a varint.
     #[error("the bytes end at byte {position} within a number: the message or file is cut short")]
     Truncated { position: usize },
-    /// A varint is longer than it must be or does not fit 64 bits.
+    /// Varint longer than necessary or beyond 64 bits.
     #[error("the number that ends at byte {position} is not a shortest 64-bit varint")]
     Varint { position: usize },
-    /// A key repeats or reaches 2^63.
+    /// Key that repeats or reaches 2^63.
     #[error("key {index}, before byte {position}, does not ascend or is not below 2^63")]
     Key { index: usize, position: usize },
     /// More keys than allowed.
@@ -45,7 +45,7 @@ pub fn encode_counts(counts: &[u32]) -> Vec<u8> {
     bytes
 }
 
-/// Decodes at most `max` keys; they ascend strictly. Allocates no more than the input justifies.
+/// Decodes at most `max` strictly ascending keys; allocates in proportion to the input.
 pub fn decode_keys(bytes: &[u8], max: usize) -> Result<Vec<MortonKey>, CodecError> {
     let mut keys = Vec::with_capacity(bytes.len().min(max));
     let mut steps = Varints::new(bytes);
@@ -74,7 +74,7 @@ pub fn decode_keys(bytes: &[u8], max: usize) -> Result<Vec<MortonKey>, CodecErro
     }
 }
 
-/// The key `step` after `before`.
+/// Key `step` after `before`.
 #[inline]
 fn next_key(before: Option<MortonKey>, step: u64) -> Option<MortonKey> {
     match before {
@@ -108,7 +108,7 @@ impl<'a> Varints<'a> {
         self.position
     }
 
-    /// The next number, `None` at the end.
+    /// Next number; `None` at the end.
     #[inline]
     pub(super) fn next_value(&mut self) -> Result<Option<u64>, CodecError> {
         match self.bytes.get(self.position) {
@@ -140,13 +140,13 @@ impl<'a> Varints<'a> {
         })
     }
 
-    /// The eight keys after `last` if each step is a byte, none zero, and stays far below 2^63.
+    /// The eight keys after `last` if each step is one nonzero byte and the keys stay far below 2^63.
     #[inline]
     fn next_eight(&mut self, last: MortonKey) -> Option<[MortonKey; 8]> {
         let rest = self.bytes.get(self.position..)?;
         let (steps, _) = rest.split_first_chunk::<8>()?;
         let packed = u64::from_le_bytes(*steps);
-        // Without top bits, taking 1 from each byte sets one exactly if there is a zero byte.
+        // Without top bits, subtracting 1 from each byte sets one exactly if there is a zero byte.
         if (packed | packed.wrapping_sub(TOP_BITS >> 7)) & TOP_BITS != 0 {
             return None;
         }
@@ -160,12 +160,12 @@ impl<'a> Varints<'a> {
     }
 }
 
-/// Signed as unsigned, small magnitudes first: 0, -1, 1, -2, ...
+/// Zigzag: signed as unsigned, small magnitudes first: 0, -1, 1, -2, ...
 pub(super) fn zigzag(value: i64) -> u64 {
     (value.wrapping_shl(1) ^ (value >> 63)) as u64
 }
 
-/// The inverse of `zigzag`.
+/// Inverse of `zigzag`.
 pub(super) fn unzigzag(value: u64) -> i64 {
     (value >> 1) as i64 ^ -((value & 1) as i64)
 }

@@ -1,11 +1,10 @@
-//! Distances of the points from their lattice points.
+//! Distortion: distances of the points from their lattice points.
 
 use crate::lattice::{BatchSums, Lattice};
 
-/// Distances are summed in this fraction of a cell side, their squares in this fraction of its
-/// square.
+/// Resolution of the sums: fraction of a cell size for distances, of its square for squares.
 const STEPS: f64 = (1_u64 << 20) as f64;
-/// Largest relative excess of a squared distance over the largest in a cell.
+/// Maximum relative excess of a squared distance over the largest in a cell.
 const SLACK: f64 = 0.02;
 
 /// Quantization error over all inserted points.
@@ -17,22 +16,22 @@ pub struct Distortion {
     pub mse_per_dimension_m2: f64,
     /// Mean distance, metres: Ryde & Brünig eq. (13).
     pub mean_distance_m: f64,
-    /// Root mean squared distance, metres: the "distance error" that Table I prints.
+    /// RMS distance, metres: the "distance error" of Table I.
     pub rms_m: f64,
-    /// Largest distance, metres.
+    /// Maximum distance, metres.
     pub max_distance_m: f64,
 }
 
-/// Integer sums behind [`Distortion`]; sums saturate, which keeps them associative.
+/// Integer sums of [`Distortion`]; they saturate and stay associative.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct DistortionSums {
     /// Number of points.
     pub points: u64,
-    /// Sum of squared distances, in cell sides^2 / 2^20.
+    /// Sum of squared distances, in cell sizes^2 / 2^20.
     pub squares: u128,
-    /// Sum of distances, in cell sides / 2^20.
+    /// Sum of distances, in cell sizes / 2^20.
     pub distances: u128,
-    /// The largest squared distance, in cell sides^2 / 2^20.
+    /// Maximum squared distance, in cell sizes^2 / 2^20.
     pub largest_square: u64,
 }
 
@@ -55,14 +54,14 @@ impl DistortionSums {
         self.largest_square = self.largest_square.max(other.largest_square);
     }
 
-    /// The sums of so many points, if those are as far off as these.
+    /// Scales the sums to `count` points of equal distortion.
     pub fn of_part(&self, points: u64) -> DistortionSums {
         let part = |sum| scaled(sum, points, self.points);
         DistortionSums {
             points,
             squares: part(self.squares),
             distances: part(self.distances),
-            // One of a part is at most the sum of them.
+            // The maximum of a part is at most its sum.
             largest_square: u128::from(self.largest_square).min(part(self.squares)) as u64,
         }
     }
@@ -71,7 +70,7 @@ impl DistortionSums {
     pub(super) fn contradiction(&self, lattice: &Lattice) -> Option<String> {
         let points = u128::from(self.points);
         let reach = lattice.covering_radius_m() / lattice.cell_side_m();
-        // A point on the border may have been taken for one just outside of its cell.
+        // A point on the border may have been assigned to the adjacent cell.
         let reach_square = reach * reach * (1.0 + SLACK) * STEPS + 1.0;
         let largest = self.largest_square as f64;
         if largest > reach_square {
@@ -80,7 +79,7 @@ impl DistortionSums {
                 "the largest distance, {largest_m} m, leaves the cell"
             ));
         }
-        // The square is rounded, the distance is not the root of what is left.
+        // The square is rounded, so the distance is not its exact root.
         let distance_limit = points.saturating_mul(((largest + 1.0) * STEPS).sqrt() as u128 + 2);
         if self.squares > points.saturating_mul(u128::from(self.largest_square))
             || self.squares < u128::from(self.largest_square)
@@ -105,7 +104,7 @@ impl DistortionSums {
     }
 }
 
-/// A sum times `part` of `whole`, rounded down; saturates.
+/// Scales a sum by `part` / `whole`, rounded down; saturates.
 pub(super) fn scaled(sum: u128, part: u64, whole: u64) -> u128 {
     let (part, whole) = (u128::from(part), u128::from(whole.max(1)));
     let rest = (sum % whole).saturating_mul(part) / whole;

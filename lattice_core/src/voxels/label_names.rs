@@ -1,34 +1,34 @@
-//! Names of labels in a map file: one more section, which readers that do not know it skip.
+//! Label names in a map file: an additional section, which other readers skip.
 //!
-//! `docs/map_file.md` describes it.
+//! Specified in `docs/map_file.md`.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
 use super::file::{FileError, MapContents, WriteOptions};
 
-/// Names by label.
+/// Label names by label.
 pub type LabelNames = BTreeMap<u16, String>;
 
-/// Longest name, bytes of UTF-8.
+/// Maximum size of a name, bytes of UTF-8.
 const MAX_NAME_BYTES: usize = 256;
-/// Longest section: all labels with the longest names.
+/// Maximum size of the section: all labels with the longest names.
 const MAX_SECTION_BYTES: u64 = (1 << 16) * (4 + MAX_NAME_BYTES as u64);
 const SECTION: &[u8; 16] = b"label_names\0\0\0\0\0";
 const SECTION_TAG: &[u8; 4] = b"SECT";
 const END_TAG: &[u8; 4] = b"LEND";
-/// No encoding of a column: names are not values of voxels.
+/// Encoding that no column has: names are not values of voxels.
 const ENCODING: u8 = 5;
-/// Bytes of the head of a file; its number of sections; its checksum.
+/// Size of the file head, bytes; position of its number of sections; of its checksum.
 const HEAD_BYTES: usize = 224;
 const SECTIONS_AT: usize = 216;
 const HEAD_CRC_AT: usize = 220;
-/// Bytes of the head of a section.
+/// Size of a section head, bytes.
 const SECTION_HEAD_BYTES: usize = 48;
-/// The end marker and the checksum of all.
+/// Size of the end marker and the checksum of the file.
 const END_BYTES: usize = 8;
 
-/// Writes a map with the names of its labels; without names, as [`MapContents::write`] does.
+/// Writes a map with its label names; without names, as [`MapContents::write`] does.
 pub fn write_named(
     map: &MapContents,
     names: &LabelNames,
@@ -53,7 +53,7 @@ pub fn write_named(
         .map_err(|source| FileError::Io { position, source })
 }
 
-/// Reads the names of labels; none where the file has none. What else the file holds is not checked.
+/// Reads the label names; empty if the file has none. The rest of the file is not validated.
 pub fn read_label_names(mut file: impl Read + Seek) -> Result<LabelNames, FileError> {
     let mut position = HEAD_BYTES as u64;
     let head = bytes::<HEAD_BYTES>(&mut file, 0, "head")?;
@@ -64,7 +64,7 @@ pub fn read_label_names(mut file: impl Read + Seek) -> Result<LabelNames, FileEr
         let corrupt = |reason: String| FileError::Corrupt { position, reason };
         let (summed, crc) = head.split_at(SECTION_HEAD_BYTES - 4);
         if !head.starts_with(SECTION_TAG) || crc32fast::hash(summed) != u32_at(crc, 0) {
-            return Err(corrupt("a section should begin here".to_owned()));
+            return Err(corrupt("expected the start of a section".to_owned()));
         }
         let stored = u64_at(&head, 32);
         if head.get(4..20) != Some(SECTION.as_slice()) {
@@ -93,7 +93,7 @@ pub fn read_label_names(mut file: impl Read + Seek) -> Result<LabelNames, FileEr
     Ok(LabelNames::new())
 }
 
-/// The first bytes of a name that fit, whole characters.
+/// Longest prefix of a name that fits, in whole characters.
 pub fn short_name(name: &str) -> &str {
     let end = (0..=MAX_NAME_BYTES.min(name.len())).rev();
     let end = { end }.find(|end| name.is_char_boundary(*end));
@@ -168,13 +168,13 @@ fn u64_at(bytes: &[u8], at: usize) -> u64 {
     eight.map_or(0, |eight| u64::from_le_bytes(*eight))
 }
 
-/// Passes a map file on with one more section before its end.
+/// Writer that inserts a section before the end of a map file.
 struct Appended<W> {
     writer: W,
     section: Vec<u8>,
-    /// The head until it is whole.
+    /// Head, until it is complete.
     head: Vec<u8>,
-    /// The last bytes, which may be the end.
+    /// Last bytes, which may be the end.
     held: Vec<u8>,
     crc: crc32fast::Hasher,
     position: u64,
@@ -188,7 +188,7 @@ impl<W: Write> Appended<W> {
         Ok(())
     }
 
-    /// The head with one section more.
+    /// Head with one more section.
     fn put_head(&mut self) -> io::Result<()> {
         let mut head = std::mem::take(&mut self.head);
         let sections = u32_at(&head, SECTIONS_AT).saturating_add(1);
@@ -201,7 +201,7 @@ impl<W: Write> Appended<W> {
 
     fn finish(mut self) -> io::Result<()> {
         if !self.held.starts_with(END_TAG) {
-            return Err(io::Error::other("the map has no end"));
+            return Err(io::Error::other("the map has no end marker"));
         }
         let mut end = std::mem::take(&mut self.section);
         end.extend(END_TAG);

@@ -1,7 +1,7 @@
-//! The occupied voxel list: which cells of a lattice hold points, how many, and where in the cell.
+//! Occupied voxel lists: which cells of a lattice contain points, how many, and where in the cell.
 //!
-//! Everything that is summed is an integer, so that neither the order of the points nor the number
-//! of threads can change a bit, and lists merge exactly.
+//! All sums are integers, so that neither the order of the points nor the number of threads changes a bit, and lists
+//! merge exactly.
 
 pub mod codec;
 pub mod file;

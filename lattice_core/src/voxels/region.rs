@@ -1,4 +1,4 @@
-//! Boxes of the map frame that cells are removed from.
+//! Boxes of the map frame from which cells are removed.
 
 use nalgebra::Vector3;
 use thiserror::Error;
@@ -6,7 +6,7 @@ use thiserror::Error;
 use super::store::block_mask::{BlockMask, places};
 use crate::lattice::{BlockKey, Lattice};
 
-/// Corners that do not bound a region: one is NaN, or the lower is above the upper.
+/// Corners that do not bound a region: NaN, or the lower above the upper.
 #[derive(Clone, PartialEq, Debug, Error)]
 #[error("corners {min_m:?} and {max_m:?} m do not bound a box: give the lower one first")]
 #[expect(missing_docs, reason = "the messages name the fields")]
@@ -15,7 +15,7 @@ pub struct RegionError {
     pub max_m: [f64; 3],
 }
 
-/// A closed box in the map frame; a cell is in it if its centre is.
+/// Closed box in the map frame; it contains the cells whose centre is inside.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Region {
     min_m: Vector3<f64>,
@@ -23,7 +23,7 @@ pub struct Region {
 }
 
 impl Region {
-    /// The box between two corners (map frame, metres), along the axes; infinite ones are allowed.
+    /// Creates the axis-aligned box between two corners (map frame, metres), which may be infinite.
     pub fn cuboid(min_m: Vector3<f64>, max_m: Vector3<f64>) -> Result<Region, RegionError> {
         if min_m.iter().zip(&max_m).all(|(min, max)| min <= max) {
             return Ok(Region { min_m, max_m });
@@ -32,12 +32,12 @@ impl Region {
         Err(RegionError { min_m, max_m })
     }
 
-    /// True if the point (map frame, metres) is inside or on the border.
+    /// Tests whether a point (map frame, metres) is inside or on the border.
     pub fn contains(&self, p: &Vector3<f64>) -> bool {
         self.contains_ball(p, 0.0) == Some(true)
     }
 
-    /// True if all of a ball is inside, false if all is outside; `None` if neither is sure.
+    /// True if a ball is entirely inside, false if entirely outside; `None` if neither is certain.
     fn contains_ball(&self, center_m: &Vector3<f64>, radius_m: f64) -> Option<bool> {
         let (low, high) = (
             center_m.add_scalar(-radius_m),
@@ -49,14 +49,14 @@ impl Region {
     }
 }
 
-/// Cells of a lattice that have their centre in a region, chosen by blocks of 8 x 8 x 8 indices.
+/// Cells of a lattice with their centre in a region, selected by blocks of 8 x 8 x 8 indices.
 pub(super) struct CellsInside {
     region: Region,
     lattice: Lattice,
     datum_m: Vector3<f64>,
-    /// From the lowest lattice point of a block to its middle.
+    /// Offset from the lowest lattice point of a block to its centre.
     middle_m: Vector3<f64>,
-    /// Radius about its middle that holds all lattice points of a block.
+    /// Radius about the centre that contains all lattice points of a block.
     radius_m: f64,
 }
 
@@ -72,7 +72,7 @@ impl CellsInside {
             lattice: lattice.clone(),
             datum_m,
             middle_m: generator * Vector3::repeat(3.5),
-            // The covering radius is far above all roundings.
+            // The covering radius is far above all rounding errors.
             radius_m: (0..4).map(corner_m).fold(0.0, f64::max) + lattice.covering_radius_m(),
         }
     }

@@ -1,11 +1,11 @@
-//! Walk over two sorted lists of cells in one pass.
+//! Merge of two sorted lists of cells in one pass.
 
 use std::cmp::Ordering;
 
 use crate::lattice::MortonKey;
 
-/// Visits every key of either list once, in order: `Less` if only in `a`, `Greater` if only in `b`.
-/// Both must ascend strictly.
+/// Visits every key of either list once, in order: `Less` if only in `a`, `Greater` if only in `b`. Both must ascend
+/// strictly.
 pub fn walk(mut a: &[MortonKey], mut b: &[MortonKey], mut visit: impl FnMut(MortonKey, Ordering)) {
     while let ([first_a, rest_a @ ..], [first_b, rest_b @ ..]) = (a, b) {
         let side = first_a.cmp(first_b);

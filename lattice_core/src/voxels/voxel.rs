@@ -1,25 +1,25 @@
 //! Count and sum of the points in one cell.
 
-/// Unit of all payload sums, metres: 2^-20 m, about a micrometre.
+/// Unit of all payload sums, metres: 2^-20 m, approximately one micrometre.
 pub const OFFSET_UNIT_M: f64 = 1.0 / (1_u64 << 20) as f64;
 
-/// The points in one cell.
+/// Points in one cell.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Voxel {
-    /// Number of points; stays at `u32::MAX` once there, and the mean offset is void from then on.
+    /// Number of points; saturates at `u32::MAX`, from which the mean offset is invalid.
     pub count: u32,
     /// Sum of point minus cell centre, in [`OFFSET_UNIT_M`].
     pub sum: [i64; 3],
 }
 
 impl Voxel {
-    /// Mean of point minus cell centre, metres; zero for no points.
+    /// Mean of point minus cell centre, metres; zero without points.
     pub fn mean_offset_m(&self) -> [f64; 3] {
         let scale = OFFSET_UNIT_M / f64::from(self.count.max(1));
         self.sum.map(|s| s as f64 * scale)
     }
 
-    /// Adds the points of another voxel. Commutative and associative, beyond saturation too.
+    /// Adds the points of another voxel; commutative and associative, also beyond saturation.
     #[inline]
     pub(super) fn add(&mut self, other: &Voxel) {
         self.count = self.count.saturating_add(other.count);
@@ -28,7 +28,7 @@ impl Voxel {
         }
     }
 
-    /// Contradiction in this voxel if no point is more than `reach` units off the centre.
+    /// Contradiction in this voxel, given that no point is more than `reach` units from the centre.
     pub(super) fn contradiction(&self, reach: u64) -> Option<String> {
         if self.count == 0 {
             return Some("a voxel without points".to_owned());

@@ -6,27 +6,27 @@ use super::{InsertReport, Region};
 use crate::cloud::Cloud;
 use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 
-/// Occupied voxels of a lattice whose indices count from a datum in the map frame.
+/// Store of occupied voxels of a lattice whose indices count from a datum in the map frame.
 ///
-/// Two stores implement it: [`super::VoxelList`] keeps a payload for each voxel,
-/// `OccupancyList` keeps one bit. Queries, set operations and files are written against this trait.
+/// Implementations: [`super::VoxelList`] with a payload per voxel, `OccupancyList` with one bit. Queries, set
+/// operations and files use this trait.
 pub trait VoxelStore: Sync {
-    /// The lattice; its indices count from [`VoxelStore::datum_index`].
+    /// Lattice; its indices count from [`VoxelStore::datum_index`].
     fn lattice(&self) -> &Lattice;
 
     /// Index of the datum in the lattice of the map frame.
     fn datum_index(&self) -> [i64; 3];
 
-    /// The lattice point that keys count from, map frame, metres.
+    /// Datum: lattice point that keys count from, map frame, metres.
     fn datum_m(&self) -> Vector3<f64>;
 
     /// Number of occupied voxels.
     fn len(&self) -> usize;
 
-    /// True if the cell is occupied.
+    /// Tests whether a cell is occupied.
     fn contains(&self, key: MortonKey) -> bool;
 
-    /// True if the cell of an index is occupied.
+    /// Tests whether the cell of an index is occupied.
     #[inline]
     fn holds(&self, w: LatticeIndex) -> bool {
         MortonKey::pack(w).is_some_and(|key| self.contains(key))
@@ -41,13 +41,13 @@ pub trait VoxelStore: Sync {
     /// Removes a voxel; false if the cell was not occupied.
     fn remove(&mut self, key: MortonKey) -> bool;
 
-    /// Keys of the voxels with their centre in a region, in no order.
+    /// Keys of the voxels with their centre in a region, unordered.
     fn keys_in(&self, region: &Region) -> Vec<MortonKey>;
 
-    /// Memory that the store holds, bytes.
+    /// Memory of the store, bytes.
     fn bytes(&self) -> usize;
 
-    /// True if no voxel is occupied.
+    /// Tests whether there is no voxel.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -57,13 +57,13 @@ pub trait VoxelStore: Sync {
         self.datum_m() + self.lattice().center(key.unpack())
     }
 
-    /// The cell of a point (map frame, metres), `None` if not finite or out of the range of keys.
+    /// Cell of a point (map frame, metres); `None` if not finite or out of the range of keys.
     fn key_of(&self, point_m: &Vector3<f64>) -> Option<MortonKey> {
         let w = self.lattice().quantize(&(point_m - self.datum_m()))?;
         MortonKey::pack(w)
     }
 
-    /// Removes the voxels with their centre in a region; gives their number.
+    /// Removes the voxels with their centre in a region; returns their number.
     fn remove_region(&mut self, region: &Region) -> usize {
         let keys = self.keys_in(region);
         keys.into_iter().filter(|key| self.remove(*key)).count()

@@ -11,7 +11,7 @@ use lattice_core::cloud::{
 };
 use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeKind, Simd};
 use lattice_core::voxels::{OccupancyList, VoxelList, VoxelStore};
-use lattice_lab::printed::Search27;
+use lattice_lab::paper_values::Search27;
 use nalgebra::{Isometry3, Vector3};
 use std::convert::Infallible;
 use std::hint::black_box;

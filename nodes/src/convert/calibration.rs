@@ -35,7 +35,7 @@ pub fn result_from(found: &Calibration) -> CalibrationResult {
             false => verdict_code(found.verdict),
         },
         reason: found.reason.clone(),
-        log_margin: found.margin.log,
+        log_margin: found.margin.log_ratio,
         inlier_fraction: found.inlier_fraction,
         rmse_m: found.rmse_m,
         weak_directions: weak
@@ -62,7 +62,7 @@ pub fn result_from(found: &Calibration) -> CalibrationResult {
         method: found.method.to_owned(),
         ..CalibrationResult::default()
     };
-    set_pose(&mut result, &found.map_from_headset, &found.covariance);
+    set_pose(&mut result, &found.target_from_source, &found.covariance);
     result
 }
 
@@ -86,7 +86,7 @@ mod tests {
     #[test]
     fn everything_that_was_found_is_told() {
         let mut found = Calibration::refused(Verdict::Degenerate, "slides");
-        found.map_from_headset = Isometry3::new(V::new(1.0, 2.0, 3.0), V::new(0.1, 0.2, 0.3));
+        found.target_from_source = Isometry3::new(V::new(1.0, 2.0, 3.0), V::new(0.1, 0.2, 0.3));
         found.covariance[(0, 5)] = 0.5;
         found.covariance[(5, 0)] = 0.5;
         found.weak_directions = vec![lattice_core::registration::WeakDirection {
@@ -98,7 +98,7 @@ mod tests {
         assert_eq!(result.verdict, CalibrationResult::DEGENERATE);
         assert_eq!((&*result.reason, &*result.method), ("slides", "none"));
         let pose = isometry_from_transform(&result.transform).unwrap();
-        assert!((pose.to_homogeneous() - found.map_from_headset.to_homogeneous()).norm() < 1e-12);
+        assert!((pose.to_homogeneous() - found.target_from_source.to_homogeneous()).norm() < 1e-12);
         assert_eq!((result.covariance[5], result.covariance[30]), (0.5, 0.5));
         assert_eq!(result.weak_directions[0].kind, WeakDirection::ROTATION);
         assert_eq!(result.weak_directions[0].axis.z, 0.8);

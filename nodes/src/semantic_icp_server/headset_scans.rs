@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use lattice_core::registration::HeadsetScan;
+use lattice_core::registration::SourceCloud;
 
 /// A bounded number of clouds, the newest last.
 pub(super) struct HeadsetScans {
@@ -13,7 +13,7 @@ pub(super) struct HeadsetScans {
 }
 
 struct Kept {
-    headset_scan: Arc<HeadsetScan>,
+    headset_scan: Arc<SourceCloud>,
     /// Time of the first of the clouds that this one stands for.
     since_ns: i64,
     stamp_ns: i64,
@@ -38,7 +38,7 @@ impl HeadsetScans {
 
     /// Adds a cloud; it replaces the newest if that has not been there for the period, and the oldest
     /// if there are too many. A headset that looks around slowly is seen from several sides.
-    pub fn push(&mut self, headset_scan: Arc<HeadsetScan>, stamp_ns: i64, now_ns: i64) {
+    pub fn push(&mut self, headset_scan: Arc<SourceCloud>, stamp_ns: i64, now_ns: i64) {
         let mut since_ns = now_ns;
         if let Some(newest) = self.kept.back()
             && now_ns.saturating_sub(newest.since_ns) < self.period_ns
@@ -50,7 +50,7 @@ impl HeadsetScans {
     }
 
     /// Adds a cloud; the oldest goes if there are too many.
-    pub fn add(&mut self, headset_scan: Arc<HeadsetScan>, stamp_ns: i64, since_ns: i64) {
+    pub fn add(&mut self, headset_scan: Arc<SourceCloud>, stamp_ns: i64, since_ns: i64) {
         if self.kept.len() >= self.max {
             self.kept.pop_front();
         }
@@ -66,7 +66,7 @@ impl HeadsetScans {
     }
 
     /// Drops the given scans.
-    pub fn remove(&mut self, headset_scans: &[Arc<HeadsetScan>]) {
+    pub fn remove(&mut self, headset_scans: &[Arc<SourceCloud>]) {
         let is_one = |kept: &Kept| {
             headset_scans
                 .iter()
@@ -75,7 +75,7 @@ impl HeadsetScans {
         self.kept.retain(|kept| !is_one(kept));
     }
 
-    pub fn all(&self) -> Vec<Arc<HeadsetScan>> {
+    pub fn all(&self) -> Vec<Arc<SourceCloud>> {
         self.kept
             .iter()
             .map(|kept| Arc::clone(&kept.headset_scan))

@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use lattice_core::registration::{Calibration, HeadsetScan, Stage, TrackUpdate, Verdict};
+use lattice_core::registration::{Calibration, SourceCloud, Stage, TrackUpdate, Verdict};
 use lattice_msgs::calibration::{
     CalibrateFeedback, CalibrateGoal, CalibrateResult, CalibrationResult,
 };
@@ -36,7 +36,7 @@ use lattice_msgs::vision_msgs::LabelInfo;
 use nalgebra::Isometry3;
 
 use self::headset_scans::HeadsetScans;
-use self::state::{Known, Running, Wanted};
+use self::state::{CurrentCalibration, PendingRequest, Running};
 use crate::convert::calibration::{result_from, set_pose};
 use crate::convert::geometry;
 use crate::map_follower::{FollowError, Followed, MapFollower};
@@ -80,20 +80,20 @@ pub struct SemanticIcpServer {
     headset_scans: HeadsetScans,
     /// Class names of the headset.
     names: BTreeMap<u16, String>,
-    known: Option<Known>,
+    current: Option<CurrentCalibration>,
     /// Searches in a row that did not find the headset where it was.
     misses: u32,
     /// Time from which a look that fits somewhat may be doubted again.
     doubt_again_ns: i64,
     running: Option<Running>,
-    wanted: Option<Wanted>,
+    pending: Option<PendingRequest>,
     /// A cloud came that no search has used.
     fresh_cloud: bool,
     /// The newest cloud that the known pose is still to be refined by, and its stamp.
-    look: Option<(Arc<HeadsetScan>, i64)>,
+    look: Option<(Arc<SourceCloud>, i64)>,
     next_job: u64,
     /// Confusions of labels learned so far are of another session, segmenter or map.
-    unlearn: bool,
+    reset_labels: bool,
     /// State of the map that the searcher has: epoch, sequence, and when.
     prepared: Option<(u64, Option<u64>, i64)>,
     last: CalibrationResult,
@@ -112,15 +112,15 @@ impl SemanticIcpServer {
                 options.headset_scan_period_ns,
             ),
             names: BTreeMap::new(),
-            known: None,
+            current: None,
             misses: 0,
             doubt_again_ns: 0,
             running: None,
-            wanted: None,
+            pending: None,
             fresh_cloud: false,
             look: None,
             next_job: 0,
-            unlearn: false,
+            reset_labels: false,
             prepared: None,
             last: CalibrationResult::default(),
             published_ns: 0,
@@ -152,7 +152,7 @@ impl SemanticIcpServer {
             }
         }
         let (_, replaced) = self.follower.take_touched();
-        self.unlearn |= replaced;
+        self.reset_labels |= replaced;
         if replaced && self.prepared.is_some() {
             // Its frame may be another one.
             self.forget("the map is a new one", now_ns, &mut out);
@@ -176,7 +176,7 @@ impl SemanticIcpServer {
             .collect();
         if self.names != names {
             self.names = names;
-            self.unlearn = true;
+            self.reset_labels = true;
         }
     }
 
@@ -186,7 +186,7 @@ impl SemanticIcpServer {
         let session: String = message.data.chars().take(256).collect();
         if session != self.session {
             self.counts.sessions += 1;
-            self.unlearn = true;
+            self.reset_labels = true;
             self.session = session;
             self.headset_scans.clear();
             self.forget("the headset has begun a new session", now_ns, &mut out);
@@ -196,13 +196,13 @@ impl SemanticIcpServer {
 
     /// Drops the known pose and ends what is at work.
     fn forget(&mut self, why: &str, now_ns: i64, out: &mut Vec<Output>) {
-        self.known = None;
+        self.current = None;
         self.misses = 0;
         self.doubt_again_ns = 0;
         self.fresh_cloud = false;
         self.look = None;
-        if let Some(wanted) = self.wanted.take() {
-            self.answer_failed(wanted.caller, why, out);
+        if let Some(pending) = self.pending.take() {
+            self.answer_failed(pending.caller, why, out);
         }
         self.end_running(why, out);
         let result = self.result(CalibrationResult::NONE, why);
@@ -224,7 +224,7 @@ impl SemanticIcpServer {
         };
         let caller = Some(call);
         let asked = self.running.as_ref().is_some_and(|r| r.caller.is_some());
-        if asked || self.wanted.is_some() {
+        if asked || self.pending.is_some() {
             if self.options.when_busy == WhenBusy::Reject {
                 self.counts.requests_busy += 1;
                 let reason = "busy: a calibration that was asked for before is at work";
@@ -232,8 +232,8 @@ impl SemanticIcpServer {
                 return out;
             }
             let why = "superseded by another request";
-            let wanted = self.wanted.take().and_then(|wanted| wanted.caller);
-            self.answer_failed(wanted, why, &mut out);
+            let waiting = self.pending.take().and_then(|pending| pending.caller);
+            self.answer_failed(waiting, why, &mut out);
             self.end_running(why, &mut out);
         } else if let Some(running) = self.running.as_mut().filter(|r| !r.tracking) {
             if start.is_none() && !running.outdated {
@@ -243,7 +243,7 @@ impl SemanticIcpServer {
             }
             self.end_running("superseded by a request", &mut out);
         }
-        self.wanted = Some(Wanted { caller, start });
+        self.pending = Some(PendingRequest { caller, start });
         self.go_on(now_ns, &mut out);
         out
     }
@@ -276,7 +276,7 @@ impl SemanticIcpServer {
     /// A client does not want its request any more.
     pub fn cancel(&mut self, call: CallId) -> Vec<Output> {
         let mut out = Vec::new();
-        let mut was_asked = self.wanted.take_if(|w| w.caller == Some(call)).is_some();
+        let mut was_asked = self.pending.take_if(|w| w.caller == Some(call)).is_some();
         let running = self.running.as_mut();
         if let Some(running) = running.filter(|r| r.caller == Some(call)) {
             running.canceled.store(true, Relaxed);
@@ -325,16 +325,16 @@ impl SemanticIcpServer {
 
     /// Publishes the transform again, for those who have come late. To be called now and then.
     pub fn tick(&mut self, now_ns: i64) -> Option<Output> {
-        let known = self.known.as_ref()?;
-        Some(Output::Transform(self.transform(known, now_ns)))
+        let current = self.current.as_ref()?;
+        Some(Output::Transform(self.transform(current, now_ns)))
     }
 
     /// Ends everything: whoever waits is answered.
     pub fn finish(&mut self) -> Vec<Output> {
         let mut out = Vec::new();
         let why = "the server ends";
-        let wanted = self.wanted.take().and_then(|wanted| wanted.caller);
-        self.answer_failed(wanted, why, &mut out);
+        let waiting = self.pending.take().and_then(|pending| pending.caller);
+        self.answer_failed(waiting, why, &mut out);
         self.end_running(why, &mut out);
         out
     }
@@ -346,7 +346,9 @@ impl SemanticIcpServer {
 
     /// `map_from_headset_origin`, while it is known.
     pub fn map_from_headset(&self) -> Option<Isometry3<f64>> {
-        self.known.as_ref().map(|known| known.map_from_headset)
+        self.current
+            .as_ref()
+            .map(|current| current.map_from_headset)
     }
 
     /// The newest result.
@@ -373,12 +375,12 @@ impl SemanticIcpServer {
         self.map_voxels() > 0
     }
 
-    fn transform(&self, known: &Known, now_ns: i64) -> TransformStamped {
+    fn transform(&self, current: &CurrentCalibration, now_ns: i64) -> TransformStamped {
         geometry::transform_stamped(
             &self.options.map_frame,
             &self.options.headset_frame,
             now_ns,
-            &known.map_from_headset,
+            &current.map_from_headset,
         )
     }
 }

@@ -1,6 +1,6 @@
 //! Parameters of the server.
 
-use lattice_core::registration::{CalibrationOptions, HeadsetScan, Profile};
+use lattice_core::registration::{CalibrationOptions, Profile, SourceCloud};
 
 use crate::convert::semantic::SemanticOptions;
 use crate::options::{frame, one_of};
@@ -128,7 +128,7 @@ impl ByProfile {
     }
 
     /// The options for clouds.
-    pub fn of_clouds(&self, headset_scans: &[HeadsetScan]) -> CalibrationOptions {
+    pub fn of_clouds(&self, headset_scans: &[SourceCloud]) -> CalibrationOptions {
         let [first, others @ ..] = &self.0;
         match others.iter().all(|other| other.profile == first.profile) {
             true => *first,
@@ -196,13 +196,13 @@ mod tests {
     use nalgebra::Point3;
 
     /// Points a metre apart on a square around the sensor.
-    fn around(half_side: i32) -> [HeadsetScan; 1] {
+    fn around(half_side: i32) -> [SourceCloud; 1] {
         let sides = -half_side..=half_side;
         let points = sides
             .clone()
             .flat_map(|x| sides.clone().map(move |y| (x, y)));
         let points = points.map(|(x, y)| Point3::new(f64::from(x), f64::from(y), 0.0));
-        [HeadsetScan {
+        [SourceCloud {
             cloud: SemanticCloud::unlabelled(points.collect()),
             sensor_m: Some(Point3::origin()),
         }]

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationRequest, Confusion, HeadsetScan, Profile, Progress,
-    SemanticCloud, Stage, TrackUpdate, Verdict, calibrate, track,
+    Calibration, CalibrationMap, CalibrationRequest, Confusion, Profile, Progress, SemanticCloud,
+    SourceCloud, Stage, TrackUpdate, Verdict, register_global, track,
 };
 use lattice_runtime::lock;
 use nalgebra::Isometry3;
@@ -25,7 +25,7 @@ pub struct MapCloud {
 /// Finds poses; made for the thread that calculates.
 pub trait Search: Send + 'static {
     /// Forgets the confusions of labels that it learned.
-    fn unlearn(&mut self);
+    fn reset_label_confusion(&mut self);
 
     /// Makes a map ready, for all that follows. The error says why it cannot be used.
     fn prepare(&mut self, map: MapCloud) -> Result<(), String>;
@@ -33,7 +33,7 @@ pub trait Search: Send + 'static {
     /// Searches the map.
     fn calibrate(
         &mut self,
-        headset_scans: &[HeadsetScan],
+        headset_scans: &[SourceCloud],
         start: Option<Isometry3<f64>>,
         progress: &dyn Progress,
     ) -> Calibration;
@@ -41,7 +41,7 @@ pub trait Search: Send + 'static {
     /// Refines `map_from_headset` by a look; `None` without a map.
     fn track(
         &mut self,
-        headset_scan: &HeadsetScan,
+        headset_scan: &SourceCloud,
         map_from_headset: &Isometry3<f64>,
     ) -> Option<TrackUpdate>;
 }
@@ -74,7 +74,7 @@ impl LatticeSearch {
 }
 
 impl Search for LatticeSearch {
-    fn unlearn(&mut self) {
+    fn reset_label_confusion(&mut self) {
         self.confusion = None;
     }
 
@@ -87,7 +87,7 @@ impl Search for LatticeSearch {
 
     fn calibrate(
         &mut self,
-        headset_scans: &[HeadsetScan],
+        headset_scans: &[SourceCloud],
         start: Option<Isometry3<f64>>,
         progress: &dyn Progress,
     ) -> Calibration {
@@ -95,13 +95,13 @@ impl Search for LatticeSearch {
             return Calibration::refused(Verdict::RejectedInput, "there is no map yet");
         };
         let request = CalibrationRequest {
-            headset_scans,
+            source_clouds: headset_scans,
             start,
             confusion: self.confusion.as_ref(),
         };
         let options = *lock(&self.options);
         let options = options.of_clouds(headset_scans);
-        let mut found = calibrate(map, &request, &options, progress);
+        let mut found = register_global(map, &request, &options, progress);
         if options.profile != Profile::Headset {
             found.reason = format!("{}; profile {}", found.reason, options.profile);
         }
@@ -114,7 +114,7 @@ impl Search for LatticeSearch {
 
     fn track(
         &mut self,
-        headset_scan: &HeadsetScan,
+        headset_scan: &SourceCloud,
         map_from_headset: &Isometry3<f64>,
     ) -> Option<TrackUpdate> {
         let map = self.map.as_ref()?;
@@ -129,14 +129,14 @@ pub enum Work {
     /// A pose by several looks, near a start if there is one.
     Calibrate {
         /// The looks.
-        headset_scans: Vec<Arc<HeadsetScan>>,
+        headset_scans: Vec<Arc<SourceCloud>>,
         /// `map_from_headset`, about.
         start: Option<Isometry3<f64>>,
     },
     /// The known pose by one more look.
     Track {
         /// The look.
-        headset_scan: Arc<HeadsetScan>,
+        headset_scan: Arc<SourceCloud>,
         /// The pose.
         map_from_headset: Isometry3<f64>,
     },
@@ -148,7 +148,7 @@ pub struct Job {
     /// Its number.
     pub id: u64,
     /// Confusions of labels learned before do not hold any more.
-    pub unlearn: bool,
+    pub reset_labels: bool,
     /// A map to be made ready first.
     pub map: Option<MapCloud>,
     /// Work of a job.
@@ -186,8 +186,8 @@ impl<F: Fn(Stage, f64) + Sync> Progress for Watch<'_, F> {
 impl Job {
     /// Calculates; `on_progress` is called with the stage and its fraction.
     pub fn run(self, search: &mut dyn Search, on_progress: impl Fn(Stage, f64) + Sync) -> Done {
-        if self.unlearn {
-            search.unlearn();
+        if self.reset_labels {
+            search.reset_label_confusion();
         }
         if let Some(map) = self.map
             && let Err(reason) = search.prepare(map)
@@ -203,7 +203,7 @@ impl Job {
                 headset_scans,
                 start,
             } => {
-                let headset_scans: Vec<HeadsetScan> = headset_scans
+                let headset_scans: Vec<SourceCloud> = headset_scans
                     .into_iter()
                     .map(Arc::unwrap_or_clone)
                     .collect();

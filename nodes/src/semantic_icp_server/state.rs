@@ -2,15 +2,15 @@
 
 use super::*;
 
-/// A search that is to begin as soon as it can, and who waits for it.
+/// Pending search, with its caller.
 #[derive(Default)]
-pub(super) struct Wanted {
+pub(super) struct PendingRequest {
     pub caller: Option<CallId>,
     pub start: Option<Isometry3<f64>>,
 }
 
-/// Known pose of the headset.
-pub(super) struct Known {
+/// Current calibration of the headset.
+pub(super) struct CurrentCalibration {
     pub map_from_headset: Isometry3<f64>,
     /// Result of the search that found it.
     pub result: CalibrationResult,
@@ -28,7 +28,7 @@ pub(super) struct Running {
     pub begun_ns: i64,
     pub stamp_ns: i64,
     /// Looks of a search; of tracking the one look.
-    pub headset_scans: Vec<Arc<HeadsetScan>>,
+    pub headset_scans: Vec<Arc<SourceCloud>>,
     pub tracking: bool,
     /// Of a search with a look that fits the known pose, yet less than it should: how it fits.
     pub doubted: Option<TrackUpdate>,
@@ -62,16 +62,16 @@ impl SemanticIcpServer {
         if self.running.is_some() {
             return;
         }
-        if let Some(wanted) = self.wanted.take() {
-            self.search_all(wanted, now_ns, out);
+        if let Some(pending) = self.pending.take() {
+            self.search_all(pending, now_ns, out);
             return;
         }
         if let Some((headset_scan, stamp_ns)) = self.look.take() {
-            if let Some(known) = &self.known {
+            if let Some(current) = &self.current {
                 self.counts.clouds_tracked += 1;
                 let work = Work::Track {
                     headset_scan,
-                    map_from_headset: known.map_from_headset,
+                    map_from_headset: current.map_from_headset,
                 };
                 self.begin(work, None, stamp_ns, now_ns, out);
                 return;
@@ -79,10 +79,10 @@ impl SemanticIcpServer {
             self.headset_scans.push(headset_scan, stamp_ns, now_ns);
             self.fresh_cloud = true;
         }
-        let due = self.fresh_cloud && self.known.is_none() && !self.headset_scans.is_empty();
+        let due = self.fresh_cloud && self.current.is_none() && !self.headset_scans.is_empty();
         if due && self.options.search == SearchWhen::Lost && self.has_map() {
             self.counts.clouds_searched += 1;
-            self.search_all(Wanted::default(), now_ns, out);
+            self.search_all(PendingRequest::default(), now_ns, out);
         }
     }
 
@@ -90,26 +90,29 @@ impl SemanticIcpServer {
     /// can fit elsewhere as well.
     pub(super) fn confirm(&mut self, now_ns: i64, out: &mut Vec<Output>) {
         let looks = self.headset_scans.len();
-        let is_due = self.known.as_ref().is_some_and(|known| looks > known.looks);
-        let is_free = self.running.is_none() && self.wanted.is_none();
+        let is_due = self
+            .current
+            .as_ref()
+            .is_some_and(|current| looks > current.looks);
+        let is_free = self.running.is_none() && self.pending.is_none();
         if !is_due || !is_free || self.options.search != SearchWhen::Lost {
             return;
         }
-        self.search_all(Wanted::default(), now_ns, out);
+        self.search_all(PendingRequest::default(), now_ns, out);
         if let Some(running) = &mut self.running {
             running.confirms = true;
         }
     }
 
     /// Begins a search with all clouds that are kept.
-    fn search_all(&mut self, wanted: Wanted, now_ns: i64, out: &mut Vec<Output>) {
+    fn search_all(&mut self, pending: PendingRequest, now_ns: i64, out: &mut Vec<Output>) {
         self.fresh_cloud = false;
         let work = Work::Calibrate {
             headset_scans: self.headset_scans.all(),
-            start: wanted.start,
+            start: pending.start,
         };
         let stamp_ns = self.headset_scans.stamp_ns();
-        self.begin(work, wanted.caller, stamp_ns, now_ns, out);
+        self.begin(work, pending.caller, stamp_ns, now_ns, out);
     }
 
     /// Makes a job of the work, with the map if the searcher has an old one.
@@ -142,7 +145,7 @@ impl SemanticIcpServer {
         };
         out.push(Output::Job(Job {
             id: self.next_job,
-            unlearn: std::mem::take(&mut self.unlearn),
+            reset_labels: std::mem::take(&mut self.reset_labels),
             map: self.map_to_prepare(now_ns, map_age_ns),
             work,
             canceled: Arc::clone(&running.canceled),

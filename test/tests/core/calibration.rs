@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan,
-    LabelDistribution, Progress, SemanticCloud, Stage, Verdict, calibrate, track,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, LabelDistribution,
+    Progress, SemanticCloud, SourceCloud, Stage, Verdict, register_global, track,
 };
 use lattice_lab::simulate::rooms::{Flat, LOOKS};
 use lattice_test::random::Random;
@@ -20,10 +20,10 @@ fn distance(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
 }
 
 /// A scan from one of the places to look from.
-fn scan(flat: &Flat, look: usize, map_from_headset: &Isometry3<f64>) -> HeadsetScan {
+fn scan(flat: &Flat, look: usize, map_from_headset: &Isometry3<f64>) -> SourceCloud {
     let (eye, yaw) = LOOKS[look];
     let eye = Point3::from(eye);
-    HeadsetScan {
+    SourceCloud {
         cloud: flat.look(eye, yaw, map_from_headset),
         sensor_m: Some(map_from_headset.inverse() * eye),
     }
@@ -41,15 +41,15 @@ fn truth(seed: u64) -> Isometry3<f64> {
 
 fn ask(
     map: &CalibrationMap,
-    headset_scans: &[HeadsetScan],
+    headset_scans: &[SourceCloud],
     start: Option<Isometry3<f64>>,
 ) -> Calibration {
     let request = CalibrationRequest {
-        headset_scans,
+        source_clouds: headset_scans,
         start,
         confusion: None,
     };
-    calibrate(map, &request, &CalibrationOptions::default(), &())
+    register_global(map, &request, &CalibrationOptions::default(), &())
 }
 
 #[test]
@@ -62,7 +62,7 @@ fn every_place_is_found_without_a_start() {
         // The last one without the place of the sensor, which rules out some poses.
         scan.sensor_m = scan.sensor_m.filter(|_| look != 4);
         let found = ask(&map, &[scan], None);
-        let error = distance(&found.map_from_headset, &truth);
+        let error = distance(&found.target_from_source, &truth);
         assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
         assert!(error.0 < 0.03 && error.1 < 0.006, "{error:?}");
     }
@@ -83,7 +83,7 @@ fn wrong_labels_cost_nothing() {
     let start = truth * Isometry3::new(Vector3::new(0.2, -0.2, 0.05), Vector3::z() * 0.15);
     for start in [None, Some(start)] {
         let found = ask(&map, std::slice::from_ref(&headset_scan), start);
-        let error = distance(&found.map_from_headset, &truth);
+        let error = distance(&found.target_from_source, &truth);
         assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
         assert!(error.0 < 0.02, "{error:?}");
         // It was learned what they are called here.
@@ -141,12 +141,12 @@ fn what_cannot_be_used_is_refused_with_a_reason() {
 }
 
 /// The points of a look for which something is so.
-fn seen(scan: HeadsetScan, is_so: impl Fn(&Point3<f64>, Option<u16>) -> bool) -> HeadsetScan {
-    let HeadsetScan { cloud, sensor_m } = scan;
+fn seen(scan: SourceCloud, is_so: impl Fn(&Point3<f64>, Option<u16>) -> bool) -> SourceCloud {
+    let SourceCloud { cloud, sensor_m } = scan;
     let all = cloud.points_m.into_iter().zip(cloud.labels);
     let (points_m, labels) = all.filter(|(p, l)| is_so(p, l.top())).unzip();
     let cloud = SemanticCloud { points_m, labels };
-    HeadsetScan { cloud, sensor_m }
+    SourceCloud { cloud, sensor_m }
 }
 
 #[test]
@@ -167,9 +167,12 @@ fn looks_at_one_plane_do_not_drag_a_tracked_pose() {
     let off = truth * Isometry3::new(Vector3::new(0.0, 0.0, 0.03), Vector3::z() * 0.005);
     let follow = |look| track(&map, look, &off, &CalibrationOptions::default());
     let update = follow(&floor);
-    assert!(update.fits && update.map_from_headset == off, "{update:?}");
+    assert!(
+        update.fits && update.target_from_source == off,
+        "{update:?}"
+    );
     // All of the look holds it.
-    assert!(distance(&follow(&look).map_from_headset, &truth).0 < 0.01);
+    assert!(distance(&follow(&look).target_from_source, &truth).0 < 0.01);
 }
 
 #[test]
@@ -185,11 +188,11 @@ fn it_can_be_ended() {
     }
     let flat = Flat::default();
     let request = CalibrationRequest {
-        headset_scans: &[scan(&flat, 0, &truth(3))],
+        source_clouds: &[scan(&flat, 0, &truth(3))],
         start: None,
         confusion: None,
     };
-    let found = calibrate(&map(&flat), &request, &CalibrationOptions::default(), &Stop);
+    let found = register_global(&map(&flat), &request, &CalibrationOptions::default(), &Stop);
     assert!(found.cancelled);
 }
 
@@ -202,10 +205,10 @@ fn a_tracked_pose_follows_and_breaks() {
     let options = CalibrationOptions::default();
     let update = track(&map, &scan(&flat, 1, &truth), &off, &options);
     assert!(update.fits);
-    assert!(distance(&update.map_from_headset, &truth).0 < 0.01);
+    assert!(distance(&update.target_from_source, &truth).0 < 0.01);
     let elsewhere = scan(&flat, 1, &Isometry3::translation(50.0, 0.0, 9.0));
     let lost = track(&map, &elsewhere, &truth, &options);
-    assert!(!lost.fits && lost.map_from_headset == truth);
-    let unusable = track(&map, &HeadsetScan::default(), &truth, &options);
-    assert!(!unusable.fits && unusable.map_from_headset == truth);
+    assert!(!lost.fits && lost.target_from_source == truth);
+    let unusable = track(&map, &SourceCloud::default(), &truth, &options);
+    assert!(!unusable.fits && unusable.target_from_source == truth);
 }

@@ -2,15 +2,15 @@
 
 use lattice_core::pose::Axes;
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan, Verdict,
-    calibrate,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, SourceCloud, Verdict,
+    register_global,
 };
 use lattice_lab::simulate::rooms::{Flat, LOOKS};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 struct Scene {
     map: CalibrationMap,
-    scan: HeadsetScan,
+    scan: SourceCloud,
     truth: Isometry3<f64>,
 }
 
@@ -26,7 +26,7 @@ impl Scene {
             cloud.labels.clear();
         }
         let sensor_m = Some(truth.inverse() * eye);
-        let scan = HeadsetScan { cloud, sensor_m };
+        let scan = SourceCloud { cloud, sensor_m };
         Scene { map, scan, truth }
     }
 
@@ -40,15 +40,15 @@ impl Scene {
         let points = scan.cloud.points_m.iter_mut().chain(&mut scan.sensor_m);
         points.for_each(|p| p.coords = change(p.coords));
         let request = CalibrationRequest {
-            headset_scans: &[scan],
+            source_clouds: &[scan],
             start: None,
             confusion: None,
         };
-        calibrate(&self.map, &request, options, &())
+        register_global(&self.map, &request, options, &())
     }
 
     fn off_m(&self, found: &Calibration) -> f64 {
-        (found.map_from_headset.translation.vector - self.truth.translation.vector).norm()
+        (found.target_from_source.translation.vector - self.truth.translation.vector).norm()
     }
 }
 
@@ -112,8 +112,8 @@ fn no_other_axes_are_tried_of_a_cloud_whose_axes_are_trusted() {
     };
     let [checked, found] = [given, trusted].map(|options| scene.ask(&options, |p| p));
     assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
-    assert_eq!(found.map_from_headset, checked.map_from_headset);
-    assert_eq!(found.other_reading_ahead, None);
+    assert_eq!(found.target_from_source, checked.target_from_source);
+    assert_eq!(found.axis_hypothesis_lead, None);
     let mirror = |p: Vector3<f64>| Vector3::new(p.x, -p.y, p.z);
     let found = scene.ask(&trusted, mirror);
     assert!(!found.reason.contains("mirrored"), "{}", found.reason);

@@ -1,8 +1,8 @@
 //! Parts of a view that the map does not explain: what is new in the room, and what is gone.
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan,
-    UnexplainedKind, Verdict, calibrate,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, SourceCloud,
+    UnexplainedKind, Verdict, register_global,
 };
 use lattice_lab::simulate::rooms::{Flat, LOOKS};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -16,7 +16,7 @@ const MIDST: Point3<f64> = Point3::new(1.6, 1.5, 0.5);
 fn ask(seen: &Flat, mapped: &Flat) -> Calibration {
     let (found, truth) = ask_by(seen, mapped, &CalibrationOptions::default());
     assert_eq!(found.verdict, Verdict::Ok, "{}", found.reason);
-    let off_m = (found.map_from_headset.translation.vector - truth.translation.vector).norm();
+    let off_m = (found.target_from_source.translation.vector - truth.translation.vector).norm();
     assert!(off_m < 0.03, "{off_m}");
     found
 }
@@ -30,17 +30,17 @@ fn ask_by(
     let truth = Isometry3::new(Vector3::new(2.0, 4.0, 1.5), Vector3::z() * 2.5);
     let (eye, yaw) = LOOKS[0];
     let eye = Point3::from(eye);
-    let scan = HeadsetScan {
+    let scan = SourceCloud {
         cloud: seen.look(eye, yaw, &truth),
         sensor_m: Some(truth.inverse() * eye),
     };
     let map = CalibrationMap::new(mapped.map(), 0.05).unwrap();
     let request = CalibrationRequest {
-        headset_scans: &[scan],
+        source_clouds: &[scan],
         start: None,
         confusion: None,
     };
-    (calibrate(&map, &request, options, &()), truth)
+    (register_global(&map, &request, options, &()), truth)
 }
 
 fn with_box() -> Flat {

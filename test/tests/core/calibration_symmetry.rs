@@ -1,7 +1,7 @@
 //! Rooms that look alike from several places: no pose may be called certain.
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, Verdict, calibrate,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, Verdict, register_global,
 };
 use lattice_lab::simulate::rooms::Flat;
 use lattice_test::random::Random;
@@ -23,13 +23,13 @@ fn ask(room: &Flat, reach_m: [f64; 2], seed: u64) -> (Calibration, f64) {
     let mut scan = room.all_around(eye, &truth, &mut || random.unit());
     scan.cloud.labels.clear();
     let request = CalibrationRequest {
-        headset_scans: &[scan.clone()],
+        source_clouds: &[scan.clone()],
         start: None,
         confusion: None,
     };
-    let found = calibrate(&map, &request, &CalibrationOptions::default(), &());
+    let found = register_global(&map, &request, &CalibrationOptions::default(), &());
     let eye = truth * scan.sensor_m.unwrap();
-    let seen = found.map_from_headset * scan.sensor_m.unwrap();
+    let seen = found.target_from_source * scan.sensor_m.unwrap();
     (found, nalgebra::distance(&eye, &seen))
 }
 

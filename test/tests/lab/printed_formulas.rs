@@ -2,7 +2,7 @@
 //! the tests of the command want all of its checks to hold).
 
 use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeIndex, LatticeKind, Simd};
-use lattice_lab::printed::{PaperQuantizer, Search27, off_by_one, printed_delta};
+use lattice_lab::paper_values::{PaperQuantizer, Search27, off_by_one, printed_delta};
 use lattice_test::random::Random;
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use std::collections::BTreeSet;

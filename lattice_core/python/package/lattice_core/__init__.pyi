@@ -1,8 +1,7 @@
 """Occupied voxel maps on lattices, and registration.
 
-Points are NumPy arrays of shape (n, 3), float32 or float64, metres; float32 and float64 rows in one block are read
-where they are. A value that is refused is a ValueError with the numbers, another type a TypeError, an error of the
-system an OSError.
+Points are NumPy arrays of shape (n, 3), float32 or float64, metres; contiguous rows are read without a copy.
+An invalid value raises ValueError with the numbers, a wrong type TypeError, an error of the system OSError.
 """
 
 from os import PathLike
@@ -38,7 +37,7 @@ class InsertReport(TypedDict):
 
 @final
 class Lattice:
-    """A lattice of cells of one volume."""
+    """Lattice of cells of one volume."""
 
     def __new__(cls, name: Literal["cubic", "bcc", "fcc", "mcc", "hex", "hexopt"], volume: float) -> Lattice: ...
     @property
@@ -49,7 +48,7 @@ class Lattice:
     def generator(self) -> npt.NDArray[np.float64]:
         """Generator matrix, shape (3, 3); columns are basis vectors, m."""
     def quantize(self, xyz: npt.ArrayLike, *, out: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.int32]:
-        """Lattice indices of the cells of points, shape (n, 3); written to `out`, in C order, where given, which is returned."""
+        """Lattice indices of the cells of points, shape (n, 3); written to `out` (C order) if given, which is returned."""
     def centers(self, cells: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Centres of cells by their lattice indices, shape (n, 3), m."""
     def __eq__(self, other: object, /) -> bool: ...
@@ -68,7 +67,7 @@ class Table:
 
 @final
 class VoxelMap:
-    """The occupied voxels of a lattice. Threads may share a map."""
+    """Occupied voxels of a lattice. Threads may share a map."""
 
     __hash__: None  # type: ignore[assignment]
     def __new__(
@@ -96,24 +95,24 @@ class VoxelMap:
         labels: npt.ArrayLike | None = None,
         stamps: npt.ArrayLike | None = None,
     ) -> InsertReport:
-        """Adds points, with a label for each (-1 for none) and a stamp (ns, or datetime64) for each or for all.
+        """Adds points, with one label per point (-1 for none) and a stamp (ns, or datetime64) per point or for all.
 
-        Rows in which something is masked are left out and counted. Interrupted, it has added some of the points.
+        Rows with a masked value are dropped and counted. An interrupted call has added some of the points.
         """
     def merge(self, other: VoxelMap) -> None:
         """Adds all voxels of another map of the same cells, exactly."""
     def crop(self, low: Sequence[float], high: Sequence[float]) -> VoxelMap:
-        """The voxels whose centres are in the closed box between two corners, m."""
+        """Map of the voxels whose centres are in the closed box between two corners, m."""
     def to_arrow(self) -> Table: ...
     @staticmethod
     def from_arrow(table: object, *, lattice: Lattice | None = None, datum: Sequence[float] | None = None) -> VoxelMap:
-        """The map of a table of cells; `lattice`, and `datum` (m) if wanted, where an engine has dropped the metadata."""
+        """Creates a map from a table of cells; `lattice`, and optionally `datum` (m), replace dropped metadata."""
     @staticmethod
     def load(path: str | PathLike[str]) -> VoxelMap: ...
     def save(self, path: str | PathLike[str], zstd: int | None = None) -> None:
-        """Writes a map file; after an error the one before stays."""
+        """Writes a map file; after an error the previous file stays."""
     def query(self, xyz: npt.ArrayLike, k: SupportsIndex = 1) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """Distances, shape (n, k), and centres, shape (n, k, 3), of the nearest occupied cells, m; of all if there are fewer."""
+        """Distances, shape (n, k), and centres, shape (n, k, 3), of the nearest occupied cells, m; fewer if there are fewer cells."""
     def centers(self) -> npt.NDArray[np.float64]: ...
     def cells(self) -> npt.NDArray[np.int64]: ...
     def counts(self) -> npt.NDArray[np.uint32]: ...
@@ -132,11 +131,11 @@ class Registration:
     def target_from_source(self) -> npt.NDArray[np.float64]: ...
     @property
     def covariance(self) -> npt.NDArray[np.float64]:
-        """Of x, y, z (m^2) and the turns about x, y, z (rad^2) in the target, shape (6, 6); of a source more than 100 m
-        from its origin x, y, z are of its middle."""
+        """Covariance of x, y, z (m^2) and of the rotations about x, y, z (rad^2) in the target, shape (6, 6); for a
+        source more than 100 m from its origin, x, y, z refer to its centroid."""
     @property
     def hessian(self) -> npt.NDArray[np.float64]:
-        """Half that of the cost, by a translation (m), then a rotation (rad) in the source, about the same point, shape (6, 6)."""
+        """Half the Hessian of the cost by a translation (m), then a rotation (rad) in the source, about the same point, shape (6, 6)."""
     @property
     def converged(self) -> bool: ...
     @property
@@ -149,7 +148,7 @@ class Registration:
 
 @final
 class Calibration:
-    """Pose of a cloud in a map, and whether it can be trusted."""
+    """Pose of a cloud in a map, with its verdict."""
 
     @property
     def verdict(self) -> Literal["OK", "AMBIGUOUS", "DEGENERATE", "NO_OVERLAP", "REJECTED_INPUT"]: ...
@@ -180,7 +179,7 @@ def gicp(
     num_threads: int | None = None,
     max_iterations: int = 20,
 ) -> Registration:
-    """Registers points to others by GICP; `cell` thins both first, m."""
+    """Registers `source` to `target` by GICP; `cell` downsamples both first, m."""
 
 def calibrate(
     map: VoxelMap,
@@ -191,12 +190,12 @@ def calibrate(
     start: npt.ArrayLike | None = None,
     profile: Literal["headset", "lidar", "depth_camera"] = "headset",
 ) -> Calibration:
-    """Finds where a cloud lies in a map, without a guess, and judges the answer."""
+    """Registers a cloud in a map without an initial guess, with a verdict."""
 
 def read_points(path: str | PathLike[str]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32] | None]:
-    """Points of a .ply or .pcd file, m, as they are in it, and their labels (-1 for none) if it has a field `label`."""
+    """Reads the points of a .ply or .pcd file, m, untransformed, and their labels (-1 for none) if it has a field `label`."""
 
 def write_points(path: str | PathLike[str], xyz: npt.ArrayLike, labels: npt.ArrayLike | None = None) -> None:
-    """Writes points, m, and their labels (-1 for none) to a binary .ply or .pcd file; after an error the one before stays.
+    """Writes points, m, and their labels (-1 for none) to a binary .ply or .pcd file; after an error the previous file stays.
 
-    PCD is float32 where all coordinates are below 4096 m, which keeps a quarter of a millimetre; Open3D reads no other."""
+    PCD is float32 if all coordinates are below 4096 m, exact to 0.25 mm; Open3D reads only float32."""

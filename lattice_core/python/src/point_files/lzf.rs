@@ -1,12 +1,12 @@
-//! LZF: pieces that are literal, or copies of what was unpacked before.
+//! LZF compression: literal pieces, and copies of earlier output.
 
-/// Unpacks data that must give `length` bytes; takes at most some 90 times the memory of `packed`.
+/// Unpacks data to exactly `length` bytes; uses at most some 90 times the memory of `packed`.
 pub fn unpack(packed: &[u8], length: usize) -> Result<Vec<u8>, String> {
     let mut data: Vec<u8> = Vec::with_capacity(length.min(packed.len().saturating_mul(4)));
     let mut bytes = packed.iter().copied();
     let cut = || "the compressed points end within a piece".to_owned();
     while let Some(control) = bytes.next() {
-        // The upper three bits are the length of a copy less 2, of which 7 is continued in the next byte.
+        // The upper three bits are the length of a copy minus 2; 7 is continued in the next byte.
         let length_bits = usize::from(control >> 5);
         if length_bits == 0 {
             let before = data.len();
@@ -26,7 +26,7 @@ pub fn unpack(packed: &[u8], length: usize) -> Result<Vec<u8>, String> {
             let start = data.len().checked_sub(back);
             let start =
                 start.ok_or_else(|| format!("a copy from {back} bytes back, of {}", data.len()))?;
-            // A copy may repeat what it has just written.
+            // A copy may overlap its own output.
             for at in start..start + length_bits + more + 2 {
                 data.extend(data.get(at).copied());
             }

@@ -1,4 +1,4 @@
-//! Point files of Open3D, PCL and others: PLY and PCD, read into arrays and written from them.
+//! Point files of Open3D, PCL and others: reading and writing PLY and PCD.
 
 mod lzf;
 mod pcd;
@@ -21,22 +21,22 @@ use crate::map_files::{Stoppable, replace};
 use crate::points::{Points, mask_of};
 use crate::threads::background;
 
-/// Coordinates below this are written to PCD in single precision, which errs by less than 0.25 mm there, m: many
-/// readers take all numbers of it for single ones.
+/// Coordinate below which PCD is written in single precision, exact to 0.25 mm, m: many readers assume single
+/// precision.
 const SINGLE_M: f64 = 4096.0;
 
 /// Points of a file.
 struct PointFile {
-    /// x, y and z of each point, m.
+    /// Coordinates of each point, m.
     xyz: Vec<f64>,
     /// Label of each point, -1 for none, if the file has labels.
     labels: Option<Vec<i32>>,
-    /// What a reader of the file may take for applied and is not.
+    /// Warning about a part of the file that is not applied.
     warning: Option<String>,
 }
 
-/// Points (m) of a `.ply` or `.pcd` file, float64 of shape (n, 3), and their labels, int32 of shape (n,), -1 for
-/// none, or None if it has no field `label`.
+/// Reads the points (m) of a `.ply` or `.pcd` file, float64 of shape (n, 3), and their labels, int32 of shape (n,),
+/// -1 for none; None without a field `label`.
 #[pyfunction]
 pub fn read_points<'py>(
     py: Python<'py>,
@@ -63,7 +63,8 @@ pub fn read_points<'py>(
     Ok((xyz, labels.transpose()?))
 }
 
-/// Writes points (m), with a label for each if given (-1 for none), to a binary `.ply` or `.pcd` file, by its name.
+/// Writes points (m), with one label per point if given (-1 for none), to a binary `.ply` or `.pcd` file, by its
+/// name.
 #[pyfunction]
 #[pyo3(signature = (path, xyz, labels=None))]
 pub fn write_points(
@@ -149,7 +150,7 @@ impl PointFile {
         }
     }
 
-    /// Adds a point; labels of -1 and 65535 are none.
+    /// Adds a point; labels -1 and 65535 mean none.
     fn push(&mut self, point_m: [f64; 3], label: Option<f64>, row: usize) -> Result<(), String> {
         self.xyz.extend(point_m);
         if let (Some(labels), Some(label)) = (&mut self.labels, label) {
@@ -165,9 +166,9 @@ impl PointFile {
     }
 }
 
-/// The lines of a header up to the one that `ends` it, and what follows.
+/// Lines of a header up to the one that `ends` it, and the remaining data.
 fn header_of(bytes: &[u8], ends: impl Fn(&str) -> bool) -> Result<(Vec<&str>, &[u8]), String> {
-    /// Longer headers are none.
+    /// Maximum size of a header, bytes.
     const MOST: usize = 1 << 16;
     let (mut lines, mut rest) = (Vec::new(), bytes);
     loop {

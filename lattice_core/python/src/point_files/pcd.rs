@@ -3,7 +3,7 @@
 use super::record::{Field, Layout, Number, Order};
 use super::{PointFile, header_of, lzf};
 
-/// The points of a file, where they are in it: a viewpoint is not applied.
+/// Reads the points of a file; the viewpoint is not applied.
 pub fn read(bytes: &[u8]) -> Result<PointFile, String> {
     let (lines, data) = header_of(bytes, |line| line.starts_with("DATA"))?;
     let words_of = |name: &str| -> Option<Vec<&str>> {
@@ -93,7 +93,7 @@ fn unpacked(data: &[u8], layout: &Layout) -> Result<Vec<u8>, String> {
     lzf::unpack(packed.ok_or("the compressed points are cut off")?, length)
 }
 
-/// The header of points and labels.
+/// Header of points and labels.
 pub fn header(points: usize, single: bool, labels: bool) -> String {
     let size = if single { 4 } else { 8 };
     let label = |text: &'static str| if labels { text } else { "" };

@@ -9,7 +9,7 @@ struct Element {
     has_lists: bool,
 }
 
-/// The vertices of a file; elements before them are passed over, what follows is not read.
+/// Reads the vertices of a file; earlier elements are skipped, later ones not read.
 pub fn read(bytes: &[u8]) -> Result<PointFile, String> {
     let (lines, mut data) = header_of(bytes, |line| line == "end_header")?;
     let mut format = None;
@@ -37,7 +37,7 @@ pub fn read(bytes: &[u8]) -> Result<PointFile, String> {
                 });
             }
             ["format" | "element" | "property", ..] => return Err(wrong()),
-            // Comments and the like.
+            // Comments and similar lines.
             _ => {}
         }
     }
@@ -70,7 +70,7 @@ pub fn read(bytes: &[u8]) -> Result<PointFile, String> {
     Err("the header has no element vertex".to_owned())
 }
 
-/// The header of points and labels.
+/// Header of points and labels.
 pub fn header(points: usize, single: bool, labels: bool) -> String {
     let kind = if single { "float" } else { "double" };
     let label = if labels {

@@ -27,7 +27,7 @@ impl Number {
         }
     }
 
-    /// The number in these bytes, the lowest first; NaN if there are too few.
+    /// Number in little-endian bytes; NaN if there are too few.
     fn read(self, mut bytes: [u8; 8], big: bool) -> f64 {
         if big {
             bytes.get_mut(..self.bytes()).unwrap_or_default().reverse();
@@ -48,37 +48,37 @@ impl Number {
     }
 }
 
-/// A named run of numbers of one type in a row.
+/// Named field of numbers of one type in a row.
 pub struct Field {
     pub name: String,
     pub number: Number,
     pub count: usize,
 }
 
-/// The numbers of a row, one after another.
+/// Fields of a row in order.
 pub struct Layout {
     pub fields: Vec<Field>,
     pub rows: usize,
 }
 
-/// Place of a number in a row.
+/// Position of a number in a row.
 #[derive(Clone, Copy)]
 struct Place {
-    /// Bytes before it.
+    /// Offset, bytes.
     byte: usize,
-    /// Numbers before it.
+    /// Index among the numbers.
     token: usize,
     number: Number,
 }
 
-/// Order of the bytes of rows, or of their columns.
+/// Byte order of rows, or column order.
 #[derive(Clone, Copy)]
 pub enum Order {
-    /// Row by row, the lowest byte of a number first.
+    /// Rows, little endian.
     Little,
-    /// Row by row, the highest byte of a number first.
+    /// Rows, big endian.
     Big,
-    /// Field by field, the lowest byte of a number first.
+    /// Columns, little endian.
     Columns,
 }
 
@@ -106,7 +106,7 @@ impl Layout {
         Ok(found)
     }
 
-    /// Places of x, y and z, and of the label if there is one.
+    /// Positions of x, y, z, and of the label if present.
     fn places(&self) -> Result<([Place; 3], Option<Place>), String> {
         let need = |name: &str| -> Result<Place, String> {
             self.place(name)?.ok_or_else(|| {
@@ -122,7 +122,7 @@ impl Layout {
         self.fields.iter().map(bytes).fold(0, usize::saturating_add)
     }
 
-    /// Bytes of all rows.
+    /// Size of all rows, bytes.
     pub fn bytes(&self) -> usize {
         self.row_bytes().saturating_mul(self.rows)
     }
@@ -132,7 +132,7 @@ impl Layout {
         counts.fold(0, usize::saturating_add)
     }
 
-    /// The points of rows of bytes.
+    /// Reads the points of binary rows.
     pub fn read_binary(&self, data: &[u8], order: Order) -> Result<PointFile, String> {
         let (axes, label) = self.places()?;
         if data.len() < self.bytes() {
@@ -164,7 +164,7 @@ impl Layout {
         Ok(file)
     }
 
-    /// The points of rows of text, of which the first `skipped` lines are of something else.
+    /// Reads the points of text rows after `skipped` other lines.
     pub fn read_text(&self, data: &[u8], skipped: usize) -> Result<PointFile, String> {
         let (axes, label) = self.places()?;
         let text = std::str::from_utf8(data).map_err(|_| "the points are no text".to_owned())?;

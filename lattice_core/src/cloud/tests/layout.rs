@@ -96,8 +96,8 @@ fn lies_about_the_extent_are_refused() {
         (|l| l.row_step = 31, "row_step 31 is shorter"),
         (|l| l.height = 3, "64 bytes, 3 rows of row_step 32 need 96"),
         (|l| l.point_step = 0, "point_step is 0"),
-        (|l| l.height = 501, "1002 points is over"),
-        (|l| (l.width, l.height) = (u32::MAX, u32::MAX), "over"),
+        (|l| l.height = 501, "has 1002 points, above"),
+        (|l| (l.width, l.height) = (u32::MAX, u32::MAX), "above"),
         // width * point_step and height * row_step overflow 32 bits.
         (|l| l.point_step = u32::MAX, "= 8589934590"),
         (|l| l.row_step = u32::MAX, "need 4294967327"),

@@ -1,18 +1,18 @@
-//! Coordinates that points of a batch have: single or double precision.
+//! Coordinate types of a batch: single or double precision.
 
 use super::kernel::{BLOCK, Lanes};
 use super::{BatchBlock, BatchQuantizer, BatchSums};
 use crate::lattice::{BlockKey, nearest_integer};
 
-/// Units of [`BatchBlock::fixed`] in a metre.
+/// Units of [`BatchBlock::fixed`] per metre.
 const PER_METRE: f64 = (1_u64 << 20) as f64;
-/// Doubles below this (metres) are integers of fewer than 2^51 units, which round exactly.
+/// Coordinate (metres) below which doubles are integers of fewer than 2^51 units, which round exactly.
 const REACH_M: f64 = (1_u64 << 31) as f64;
 
-/// Coordinate of a point: `f32` goes through the kernel, `f64` through the closed form.
+/// Coordinate of a point: `f32` uses the kernel, `f64` the closed form.
 pub trait Coordinate: Copy + Into<f64> + Send + Sync + 'static {
-    /// Visits the cells of up to [`BatchQuantizer::BLOCK`] points at a time, in order, with the quantization error
-    /// of the points that have a cell.
+    /// Visits the cells of up to [`BatchQuantizer::BLOCK`] points at a time, in order, with the quantization error of
+    /// the points that have a cell.
     fn for_blocks_with_sums(
         quantizer: &BatchQuantizer,
         points: &[[Self; 3]],
@@ -38,7 +38,7 @@ impl Coordinate for f32 {
     }
 }
 
-/// Coordinates from 2^31 m on have no cell.
+/// Coordinates of 2^31 m and more have no cell.
 impl Coordinate for f64 {
     fn for_blocks_with_sums(
         quantizer: &BatchQuantizer,

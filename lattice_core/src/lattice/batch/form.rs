@@ -1,9 +1,9 @@
-//! The lattices as forms of one kernel, in single precision.
+//! Lattices as forms of one kernel, in single precision.
 //!
-//! In coordinates `u = T w` every lattice of the paper is Z^3, alone or with a second copy that is
-//! centred in the cuboid (BCC, MCC, FCC with c/a = 1, 2^(1/4), sqrt 2) or in its xy face (hex). The
-//! nearest point is the rounded one, or the rounded one moved by half a side along every centred
-//! axis towards the rest, whichever is nearer.
+//! In coordinates `u = T w`, every lattice of the paper is Z^3, alone or with a second centred copy. The copy is
+//! centred in the cuboid (BCC, MCC, FCC with c/a = 1, 2^(1/4), sqrt 2) or in its xy face (hex). The nearest point is
+//! the rounded one, or that one moved by half a side along every centred axis towards the remainder, whichever is
+//! nearer.
 
 use std::num::Wrapping;
 
@@ -11,20 +11,20 @@ use nalgebra::Matrix3;
 
 use crate::lattice::LatticeKind;
 
-/// Integers of the kernel: those of undecided points may wrap.
+/// Integers of the kernel, which may wrap for undecided points.
 pub(super) type Int = Wrapping<i32>;
 
-/// Constants of a lattice, known at compile time.
+/// Compile-time constants of a lattice.
 pub(super) trait Form: Copy + Send + Sync + 'static {
     /// True if there is a second copy.
     const CENTRED: bool;
-    /// True if the copy is moved along z too.
+    /// True if the copy is also shifted along z.
     const CENTRED_Z: bool;
 
-    /// `weights . |rest|` above this: the second copy is nearer.
+    /// Value of `weights . |rest|` above which the second copy is nearer.
     fn threshold(weights: [f32; 3]) -> f32;
 
-    /// The index in the paper's basis from doubled coordinates.
+    /// Index in the paper's basis from doubled coordinates.
     fn index(doubled: [Int; 3]) -> [Int; 3];
 }
 
@@ -34,7 +34,7 @@ pub(super) struct Cubic;
 /// Centred cuboid with the paper's BCC basis.
 #[derive(Clone, Copy)]
 pub(super) struct Bcc;
-/// Centred cuboid with the paper's FCC basis; its square is turned by 45 degrees.
+/// Centred cuboid with the paper's FCC basis, its square rotated by 45 degrees.
 #[derive(Clone, Copy)]
 pub(super) struct Fcc;
 /// Centred cuboid with the paper's MCC basis.
@@ -102,8 +102,8 @@ impl Form for Hex {
     }
 }
 
-/// `T` with `u = T w` for index `w`, and the squared sides of the cuboid over the first one's; none
-/// for a lattice that has no form.
+/// `T` with `u = T w` for index `w`, and the squared sides of the cuboid relative to the first; `None` for a lattice
+/// without a form.
 pub(super) fn axes(
     kind: LatticeKind,
     generator: &Matrix3<f64>,

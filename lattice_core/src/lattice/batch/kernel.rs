@@ -1,22 +1,21 @@
-//! Eight points at once in single precision, with a proof for each.
+//! Eight points at a time in single precision, with a certificate for each.
 //!
-//! `u = M p + phi` is computed in f32. Every decision (three roundings and the choice of the copy)
-//! is compared with a bound on the error of `u`; a point that is closer to a border of cells than
-//! the bound is not decided here but in double precision. What is decided is the cell that exact
-//! arithmetic gives.
+//! `u = M p + phi` is computed in f32. Every decision (three roundings and the choice of the copy) is compared with
+//! an error bound of `u`. A point closer to a cell border than the bound is decided in double precision instead. A
+//! decided point has the cell of exact arithmetic.
 
 use std::num::Wrapping;
 
 use super::form::Form;
 use crate::lattice::BlockKey;
 
-/// Points that are quantized together.
+/// Points quantized together.
 pub(crate) const BLOCK: usize = 128;
 
-/// Adding this leaves a float rounded half to even with the integer in its low bits.
+/// Addend that leaves a float, rounded half to even, as an integer in its low bits.
 const ROUND: f32 = 1.5 * (1_u32 << 23) as f32;
 
-/// Statistics count in this fraction of a cell side (and of its square).
+/// Resolution of the statistics: fraction of a cell side (and of its square).
 pub(crate) const STEPS: f32 = (1_u32 << 20) as f32;
 
 #[derive(Clone, Copy, Debug)]
@@ -25,19 +24,19 @@ pub(super) struct Constants {
     pub(super) rows: [[f32; 3]; 3],
     /// `phi`, at most a half.
     pub(super) phase: [f32; 3],
-    /// Index of the lattice point that the phase counts from, plus 2^20.
+    /// Index of the lattice point of the phase, plus 2^20.
     pub(super) base: [i32; 3],
-    /// Squared sides over the first one's.
+    /// Squared sides relative to the first.
     pub(super) weights: [f32; 3],
     pub(super) threshold: f32,
-    /// Bound of the error of `weights . |rest|` over that of `u`.
+    /// Ratio of the error bound of `weights . |rest|` to that of `u`.
     pub(super) excess_per_error: f32,
-    /// Squared sides of the cuboid over the squared cell side (cube root of the volume).
+    /// Squared sides of the cuboid relative to the squared cell side (cube root of the volume).
     pub(super) squared_sides: [f32; 3],
-    /// The error of each `u` is below `error_per_metre * (|x| + |y| + |z|) + error`.
+    /// Error bound of each `u`: `error_per_metre * (|x| + |y| + |z|) + error`.
     pub(super) error_per_metre: f32,
     pub(super) error: f32,
-    /// Beyond this `|x| + |y| + |z|` (metres) a point is not decided here.
+    /// Limit of `|x| + |y| + |z|` (metres) above which a point stays undecided.
     pub(super) reach_m: f32,
 }
 
@@ -47,7 +46,7 @@ pub(super) struct Lane {
     pub(super) code: [u32; 2],
     /// All ones if decided.
     pub(super) decided: i32,
-    /// Distance from the lattice point, and its square, in 1/`STEPS`.
+    /// Distance from the lattice point, and its square, in units of 1/`STEPS`.
     pub(super) distance: i32,
     pub(super) square: i32,
 }
@@ -65,8 +64,7 @@ pub(super) fn to_int(v: f32) -> i32 {
     nearest(v).0
 }
 
-/// A coordinate below `FIXED_REACH_M` in 2^-20 m, half to even: first with 12 bits less, then the
-/// rest, which is exact.
+/// Coordinate below `FIXED_REACH_M` in 2^-20 m, half to even: first with 12 bits less, then the exact remainder.
 #[inline(always)]
 fn to_fixed(metres: f32) -> i32 {
     let (high, rest) = nearest(metres * 256.0);
@@ -92,10 +90,9 @@ pub(super) fn lane<F: Form, const DIAGONAL: bool>(c: &Constants, [x, y, z]: [f32
     let size = x.abs() + y.abs() + z.abs();
     let error = size * c.error_per_metre + c.error;
     let mut doubled = [near_x, near_y, near_z].map(|near| Wrapping(near) << 1);
-    // Distances along the axes from the point that was chosen. Near a half, the next one along the
-    // axis is as near.
+    // Distances along the axes from the chosen point. Near one half, the next point along the axis is equally near.
     let (mut dx, mut dy, mut dz) = (ax, ay, az);
-    // False for NaN, wherever it came from.
+    // False for NaN of any origin.
     let mut decided = size < c.reach_m;
     if F::CENTRED {
         let mut excess = c.weights[0] * ax + c.weights[1] * ay;
@@ -130,16 +127,16 @@ pub(super) fn lane<F: Form, const DIAGONAL: bool>(c: &Constants, [x, y, z]: [f32
     }
 }
 
-/// Coordinates below this (metres) fit 32 bits in units of 2^-20 m.
+/// Coordinate (metres) below which units of 2^-20 m fit 32 bits.
 pub(super) const FIXED_REACH_M: f32 = 2000.0;
 
-/// Codes and marks of a block of points.
+/// Codes and decision masks of a block of points.
 #[derive(Clone)]
 pub(super) struct Lanes {
     pub(super) codes: [BlockKey; BLOCK],
     /// All ones if decided.
     pub(super) decided: [i32; BLOCK],
-    /// The points in 2^-20 m, axis by axis; with statistics only.
+    /// Points in 2^-20 m by axis; only with statistics.
     pub(super) fixed: [[i32; BLOCK]; 3],
 }
 
@@ -154,7 +151,7 @@ impl Default for Lanes {
 }
 
 impl Lanes {
-    /// One bit for each eight points that are not all decided.
+    /// One bit per eight points that are not all decided.
     #[inline]
     pub(super) fn open(&self) -> u32 {
         let groups = self.decided.as_chunks::<8>().0.iter();
@@ -179,7 +176,7 @@ pub(super) fn block<F: Form, const DIAGONAL: bool, const STATISTICS: bool>(
     points: &[[f32; 3]; BLOCK],
     out: &mut Lanes,
 ) -> LaneSums {
-    // One loop for each width of numbers, so that the vectors of each are full.
+    // One loop per number width, so that the vectors of each are full.
     let mut axes = [[0.0; BLOCK]; 3];
     for i in 0..BLOCK {
         let [x, y, z] = points[i];

@@ -1,8 +1,8 @@
-//! Batch quantizer: [`Lattice::quantize`] for many points at once.
+//! Batch quantizer: [`Lattice::quantize`] for many points.
 //!
-//! Points go through a single precision kernel that knows which of its answers are certain
-//! (`kernel`); the others, some in a thousand, go through the double precision closed form. So the
-//! batch gives what single points give, to the bit, on every machine and instruction set.
+//! Points pass a single-precision kernel that certifies its results (`kernel`). The uncertified ones, some in a
+//! thousand, use the double-precision closed form. A batch therefore gives the same bits as single points on every
+//! machine and instruction set.
 
 mod coordinate;
 mod form;
@@ -18,14 +18,14 @@ use form::{Bcc, Cubic, Fcc, Form, Hex, Mcc};
 use kernel::{BLOCK, Constants, Lane, LaneSums, Lanes, STEPS};
 pub use simd::Simd;
 
-/// Lines of memory of a block of points.
+/// Cache lines of a block of points.
 const BLOCK_LINES: usize = BLOCK * size_of::<[f32; 3]>() / 64;
 
 /// Half of one unit in the last place of 1.
 const EPSILON: f64 = 1.0 / (1_u64 << 24) as f64;
-/// The kernel answers for points less than this many cuboid sides from the phase's lattice point,
+/// Maximum distance of a point from the phase's lattice point in the kernel, in cuboid sides.
 const KERNEL_REACH: f64 = (1 << 13) as f64;
-/// which has indices smaller than this.
+/// Bound of the indices of the phase's lattice point.
 const BASE_LIMIT: u64 = 1 << 18;
 
 /// Quantizes batches of points that share a rigid transform to the lattice.
@@ -46,7 +46,7 @@ struct Kernel {
     constants: Constants,
 }
 
-/// Sums over the points of a batch, in 1/2^20 of a cell side (cube root of the cell volume).
+/// Sums over the points of a batch, in 2^-20 of a cell side (cube root of the cell volume).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct BatchSums {
     /// Number of points.
@@ -55,19 +55,19 @@ pub struct BatchSums {
     pub distances: u64,
     /// Sum of squared distances.
     pub squares: u64,
-    /// The largest squared distance.
+    /// Maximum squared distance.
     pub largest_square: u64,
-    /// True if some point is too far from the origin of the points for 32-bit fixed point.
+    /// True if a point is too far from the origin of the points for 32-bit fixed point.
     pub far: bool,
 }
 
-/// A block of points and what is known of them.
+/// Block of points with their cells.
 pub struct BatchBlock<'a> {
-    /// The cell of each.
+    /// Cell of each point.
     pub codes: &'a [BlockKey],
-    /// Quantization error of those that have a cell.
+    /// Quantization error of the points that have a cell.
     pub sums: &'a BatchSums,
-    /// Coordinates of the points, axis by axis, in 2^-20 m modulo 2^32, within one unit; void if `sums.far`.
+    /// Coordinates of the points by axis, in 2^-20 m modulo 2^32, within one unit; invalid if `sums.far`.
     pub fixed: &'a [[i32; BLOCK]; 3],
 }
 
@@ -83,12 +83,12 @@ impl BatchSums {
 }
 
 impl BatchQuantizer {
-    /// For points whose coordinates in the lattice are `lattice_from_points * p`, metres.
+    /// Creates a quantizer of points with lattice coordinates `lattice_from_points * p`, metres.
     pub fn new(lattice: &Lattice, lattice_from_points: Isometry3<f64>) -> BatchQuantizer {
         Self::with_simd(lattice, lattice_from_points, Simd::detect())
     }
 
-    /// [`BatchQuantizer::new`] with a choice of instructions, which never changes an answer.
+    /// [`BatchQuantizer::new`] with a given instruction set, which does not change results.
     pub fn with_simd(
         lattice: &Lattice,
         lattice_from_points: Isometry3<f64>,
@@ -105,7 +105,7 @@ impl BatchQuantizer {
         }
     }
 
-    /// The point in the lattice, metres: rotated, then moved, each in double precision.
+    /// Point in the lattice frame, metres: rotated, then translated, each in double precision.
     #[inline]
     pub fn transform<T: Into<f64>>(&self, p: [T; 3]) -> Vector3<f64> {
         let p = Vector3::from(p.map(T::into));
@@ -121,15 +121,16 @@ impl BatchQuantizer {
         self.lattice_from_points.translation.vector.into()
     }
 
-    /// Appends the cell of each point, [`BlockKey::NONE`] where [`Lattice::quantize`] of the
-    /// transformed point gives none.
+    /// Appends the cell of each point, or [`BlockKey::NONE`] where [`Lattice::quantize`] of the transformed point is
+    /// `None`.
     pub fn codes(&self, points: &[[f32; 3]], codes: &mut Vec<BlockKey>) {
         codes.reserve(points.len());
         self.for_blocks(points, |block, _| codes.extend_from_slice(block));
     }
 
-    /// Writes the lattice index of each point to the same place of `indices`, which is as long;
-    /// the first point without a cell, whose index is void.
+    /// Writes the lattice index of each point to `indices`, of the same length.
+    ///
+    /// Returns the first point without a cell, whose index is invalid.
     pub fn indices(&self, points: &[[f32; 3]], indices: &mut [LatticeIndex]) -> Option<usize> {
         let (mut bad, mut at, mut rest) = (None, 0, indices);
         self.for_blocks(points, |block, sums| {
@@ -147,8 +148,8 @@ impl BatchQuantizer {
         bad
     }
 
-    /// Visits the cells of up to [`BatchQuantizer::BLOCK`] points at a time, in order. Of the sums
-    /// only the number of points with a cell is kept.
+    /// Visits the cells of up to [`BatchQuantizer::BLOCK`] points at a time, in order. Of the sums, only the number
+    /// of points with a cell is kept.
     #[inline]
     pub fn for_blocks(&self, points: &[[f32; 3]], mut visit: impl FnMut(&[BlockKey], &BatchSums)) {
         self.blocks::<false>(points, |block| visit(block.codes, block.sums));
@@ -160,7 +161,7 @@ impl BatchQuantizer {
         self.blocks::<true>(points, visit);
     }
 
-    /// Most points in a block.
+    /// Maximum number of points in a block.
     pub const BLOCK: usize = BLOCK;
 
     #[inline]
@@ -173,7 +174,7 @@ impl BatchQuantizer {
         let (blocks, rest) = points.as_chunks::<BLOCK>();
         for (number, block) in blocks.iter().enumerate() {
             if let Some(soon) = blocks.get(number + 2) {
-                // Their turn comes in bursts, which the processor's own prefetching does not foresee.
+                // They follow in bursts, which hardware prefetching does not predict.
                 prefetch::<BLOCK_LINES, _>(soon);
             }
             let sums = self.block::<STATISTICS>(block, BLOCK, &mut lanes);
@@ -198,7 +199,7 @@ impl BatchQuantizer {
         }
     }
 
-    /// Fills the codes of the first `used` points.
+    /// Computes the codes of the first `used` points.
     #[inline]
     fn block<const STATISTICS: bool>(
         &self,
@@ -233,7 +234,7 @@ impl BatchQuantizer {
         sums
     }
 
-    /// Decides what the kernel could not.
+    /// Decides the points that the kernel left undecided.
     #[cold]
     fn settle(
         &self,
@@ -317,10 +318,10 @@ impl Kernel {
         }
         let phase = u_from_lattice * (translation - lattice.center_wide(base));
         let largest = m.amax();
-        // Of the products and sums of the closed form, were the point at the far end of the keys.
+        // Error of the products and sums of the closed form for a point at the limit of the keys.
         let far = u_from_lattice.amax() * translation.lp_norm(1);
         let diagonal = m == Matrix3::from_diagonal(&m.diagonal());
-        // Products of two rounded numbers, their sum, and the phase added.
+        // Error of products of two rounded numbers, their sum, and the added phase.
         let roundings = if diagonal { 3.0 } else { 5.0 };
         let weights = squares.map(|s| (s / squares[0]) as f32);
         let centred_weight: f32 = weights.iter().sum();

@@ -1,26 +1,26 @@
-//! Instruction sets that the kernel is compiled for.
+//! Instruction sets of the kernel.
 //!
-//! The kernel is plain code; the compiler vectorises it for what a function allows. AVX2 is worth a
-//! factor of two over the baseline; AVX-512 is not offered, since the compiler then gathers the
-//! coordinates at a quarter of the speed. No fused multiply-add: it would change bits.
+//! The kernel is plain code, vectorized by the compiler. AVX2 is twice as fast as the baseline. AVX-512 is not
+//! offered: the compiler then gathers the coordinates at a quarter of the speed. Fused multiply-add is not used,
+//! since it changes bits.
 
 use super::form::Form;
 use super::kernel::{self, BLOCK, Constants, LaneSums, Lanes};
 
-/// The kernel for some lattice and instruction set.
+/// Kernel of one lattice and instruction set.
 pub(super) type Run = fn(&Constants, &[[f32; 3]; BLOCK], &mut Lanes) -> LaneSums;
 
-/// An instruction set; all give the same bits.
+/// Instruction set; all yield the same bits.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Simd {
-    /// Instructions of every machine of the target.
+    /// Baseline instructions of the target.
     Portable,
-    /// 256-bit vectors on x86-64; the portable code on a machine without them.
+    /// 256-bit vectors on x86-64; the portable code on other machines.
     Avx2,
 }
 
 impl Simd {
-    /// The best that this machine has.
+    /// Detects the best instruction set.
     pub fn detect() -> Simd {
         if avx2_is_here() {
             Simd::Avx2
@@ -45,7 +45,7 @@ fn avx2_is_here() -> bool {
     false
 }
 
-/// Called only through `Simd::run`, which has looked whether the machine has AVX2.
+/// Called only by `Simd::run`, which detected AVX2.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 fn checked_avx2<F: Form, const DIAGONAL: bool, const STATISTICS: bool>(
@@ -53,7 +53,7 @@ fn checked_avx2<F: Form, const DIAGONAL: bool, const STATISTICS: bool>(
     points: &[[f32; 3]; BLOCK],
     out: &mut Lanes,
 ) -> LaneSums {
-    // SAFETY: `run` hands this function out only where the machine has AVX2.
+    // SAFETY: `run` returns this function only if AVX2 was detected.
     unsafe { avx2::<F, DIAGONAL, STATISTICS>(c, points, out) }
 }
 

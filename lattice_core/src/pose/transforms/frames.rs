@@ -1,4 +1,4 @@
-//! Table of frames with the parents that publishers gave them.
+//! Table of frames with the parents that publishers assign.
 
 use nalgebra::Isometry3;
 use rustc_hash::FxHashMap;
@@ -7,7 +7,7 @@ use super::TfInsertError;
 use super::path::Path;
 use crate::pose::track::Track;
 
-/// Most parents of a frame, static and moving ones counted apart.
+/// Maximum number of parents of a frame, static and dynamic ones separately.
 const MAX_PARENTS: usize = 4;
 const MAX_KEPT: usize = 64;
 
@@ -17,7 +17,7 @@ pub(super) enum Link {
     Moving(Track),
 }
 
-/// A parent that a publisher gave to a frame.
+/// Parent assigned by a publisher.
 #[derive(Clone, Debug)]
 struct Claim {
     parent: usize,
@@ -28,12 +28,12 @@ struct Claim {
 #[derive(Clone, Debug)]
 struct Frame {
     name: String,
-    /// Static ones first, then in the order in which they came.
+    /// Static parents first, then in the order of arrival.
     claims: Vec<Claim>,
     heard: u64,
 }
 
-/// Frames by number and by name; `heard` counts the transforms, the newest has the highest.
+/// Frames by number and by name; `heard` counts transforms, the newest has the highest value.
 #[derive(Clone, Debug)]
 pub(super) struct Frames {
     frames: Vec<Frame>,
@@ -73,7 +73,7 @@ impl Frames {
         }
     }
 
-    /// Parents of a frame, those of static transforms first.
+    /// Parents of a frame, static ones first.
     pub fn parents(&self, id: usize) -> impl Iterator<Item = usize> + '_ {
         let frame = self.frames.get(id);
         frame
@@ -81,14 +81,14 @@ impl Frames {
             .flat_map(|frame| frame.claims.iter().map(|claim| claim.parent))
     }
 
-    /// The transform of a frame in one of its parents, the static one if there are two.
+    /// Transform of a frame to one of its parents; the static one if there are two.
     pub fn claim(&self, id: usize, parent: usize) -> Option<&Link> {
         let mut claims = self.frames.get(id)?.claims.iter();
         let claim = claims.find(|claim| claim.parent == parent);
         claim.map(|claim| &claim.link)
     }
 
-    /// The uppermost frame that a frame hangs below by static transforms alone; itself if by none.
+    /// Highest ancestor over static transforms only; the frame itself if there is none.
     pub fn static_root(&self, id: usize) -> usize {
         let parent = |id: usize| {
             let frame = self.frames.get(id)?;
@@ -96,18 +96,18 @@ impl Frames {
             let claim = claims.find(|claim| matches!(claim.link, Link::Static(_)))?;
             Some(claim.parent)
         };
-        // A loop of static transforms ends at the bound.
+        // The bound ends a loop of static transforms.
         (0..self.frames.len())
             .try_fold(id, |id, _| parent(id).ok_or(id))
             .unwrap_or_else(|root| root)
     }
 
-    /// The shortest way from one frame to another by way of a common ancestor.
+    /// Shortest path between two frames over a common ancestor.
     pub fn path(&self, target: usize, source: usize) -> Option<Path> {
         Path::find(target, source, |id| self.parents(id))
     }
 
-    /// The moving transforms of a child in one of its parents.
+    /// Dynamic transforms of a child in one of its parents.
     pub fn track_mut(&mut self, parent: &str, child: &str) -> Option<&mut Track> {
         let (parent, child) = (self.find(parent)?, self.find(child)?);
         let claims = self.frames.get_mut(child)?.claims.iter_mut();
@@ -119,7 +119,7 @@ impl Frames {
         tracks.next()
     }
 
-    /// The link from a child to a parent, new if need be; it takes the place of one the other way.
+    /// Link from a child to a parent, created if missing; it replaces an opposite one.
     pub fn link(
         &mut self,
         parent: &str,
@@ -156,7 +156,7 @@ impl Frames {
         Ok(&mut claim.link)
     }
 
-    /// Adds a claim and gives its place; of too many, the one heard longest ago goes.
+    /// Adds a parent and returns its index; beyond the limit, the one least recently heard is dropped.
     fn add_claim(&mut self, child: usize, parent: usize, is_static: bool) -> usize {
         let protected = self.protected();
         let Some(frame) = self.frames.get_mut(child) else {
@@ -184,7 +184,7 @@ impl Frames {
         at
     }
 
-    /// Links from frame to parent between the first frame kept and the others.
+    /// Links from frame to parent between the first kept frame and the others.
     fn protected(&self) -> Vec<(usize, usize)> {
         let mut kept = self.kept.iter().filter_map(|name| self.find(name));
         let Some(first) = kept.next() else {
@@ -196,7 +196,7 @@ impl Frames {
             .collect()
     }
 
-    /// Forgets frames until there is room for two names.
+    /// Drops frames until two names fit.
     fn make_room(&mut self, parent: &str, child: &str) -> Result<(), TfInsertError> {
         let max_frames = self.max_frames;
         let full = || TfInsertError::TooManyFrames {
@@ -239,7 +239,7 @@ impl Frames {
         }
     }
 
-    /// Number of a frame that is named now, new if need be.
+    /// Index of a named frame, created if missing.
     fn id(&mut self, name: &str) -> usize {
         let id = self.find(name).unwrap_or(self.frames.len());
         let heard = self.heard;

@@ -1,4 +1,4 @@
-//! Transforms of frames by time, as many publishers give them.
+//! Buffer of timed transforms from any number of publishers.
 
 mod frames;
 mod path;
@@ -14,16 +14,15 @@ use super::{PoseMiss, PushOutcome, TfInsertError, TfMiss};
 /// Bounds of a [`TransformBuffer`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TransformBufferOptions {
-    /// Age against the newest of a frame up to which its transforms are kept, seconds.
+    /// Maximum age of a kept transform relative to the newest of its frame, seconds.
     pub history_s: f64,
-    /// Longest time between two transforms that is interpolated over, seconds.
+    /// Maximum time between two interpolated transforms, seconds.
     pub max_gap_s: f64,
-    /// Most frames.
+    /// Maximum number of frames.
     pub max_frames: usize,
-    /// Most transforms kept of a frame, at least 2.
+    /// Maximum number of transforms per frame, at least 2.
     pub max_samples: usize,
-    /// A transform older than the newest of its frame by more than this means that time was
-    /// set back, seconds.
+    /// Time step backwards from which a transform resets the history of its frame, seconds.
     pub jump_back_s: f64,
 }
 
@@ -39,11 +38,11 @@ impl Default for TransformBufferOptions {
     }
 }
 
-/// Transforms of all frames by time, as `/tf` and `/tf_static` give them.
+/// Transforms of all frames by time, from `/tf` and `/tf_static`.
 ///
-/// A frame may have several parents: one wrong publisher does not take the right one's place, for a
-/// lookup goes the shortest way, static transforms first. A full table forgets the frame that was
-/// named longest ago, but none between those to [`keep`](Self::keep).
+/// A frame may have several parents, so a wrong publisher does not displace the right one. A lookup takes the
+/// shortest path, static transforms first. A full table drops the frame least recently heard, except those on the
+/// path to [`keep`](Self::keep).
 #[derive(Clone, Debug)]
 pub struct TransformBuffer {
     frames: Frames,
@@ -54,7 +53,7 @@ pub struct TransformBuffer {
 }
 
 impl TransformBuffer {
-    /// Empty buffer; negative or NaN durations count as zero.
+    /// Creates an empty buffer; negative or NaN durations count as zero.
     pub fn new(options: TransformBufferOptions) -> TransformBuffer {
         TransformBuffer {
             frames: Frames::new(options.max_frames),
@@ -65,18 +64,16 @@ impl TransformBuffer {
         }
     }
 
-    /// Keeps a frame, and all on the way to the first one kept, when the table is full.
+    /// Keeps a frame, and those between it and the first kept one, when the table is full.
     pub fn keep(&mut self, frame: &str) {
         self.frames.keep(bare(frame));
     }
 
-    /// Takes `parent_from_child` at a time; a static one holds at all times and replaces
-    /// the one before. A leading `/` of a name is ignored.
+    /// Inserts `parent_from_child` at a time; a static transform is valid at all times and replaces the previous one.
     ///
-    /// Transforms of a frame may come in any order within its history: a second one of the
-    /// same time, or an older one, is [`PushOutcome::OutOfOrder`]. After
-    /// [`PushOutcome::JumpedBack`] the history of that frame starts anew. A parent that has been
-    /// below its child until now is its parent from now on.
+    /// A leading `/` of a name is ignored. Transforms of a frame may arrive in any order within its history; one with
+    /// an existing time, or an older one, is [`PushOutcome::OutOfOrder`]. After [`PushOutcome::JumpedBack`] the
+    /// history of that frame restarts. A parent that was a child of its new child becomes the parent.
     pub fn insert(
         &mut self,
         parent: &str,
@@ -117,10 +114,10 @@ impl TransformBuffer {
         }
     }
 
-    /// `target_from_source` at a time, by way of the nearest common ancestor; exact at the
-    /// samples of a moving frame, linear and slerp between them, nothing outside of them.
+    /// `target_from_source` at a time, over the nearest common ancestor: exact at samples, else linear interpolation
+    /// and slerp, no extrapolation.
     ///
-    /// Of several misses the one is reported that no waiting can heal.
+    /// Of several errors, one that waiting cannot resolve is returned first.
     pub fn lookup(
         &self,
         target: &str,
@@ -148,7 +145,7 @@ impl TransformBuffer {
         }
     }
 
-    /// Product of transforms at a time, from the uppermost frame to the lowest.
+    /// Product of transforms at a time, from the highest frame to the lowest.
     fn compose(
         &self,
         steps: impl Iterator<Item = (usize, usize)>,
@@ -173,13 +170,14 @@ impl TransformBuffer {
         miss.map_or(Ok(sum), Err)
     }
 
-    /// True if some transform named the frame.
+    /// Tests whether a frame is known.
     pub fn contains(&self, frame: &str) -> bool {
         self.frames.find(bare(frame)).is_some()
     }
 
-    /// Name of the uppermost frame that a frame hangs below by static transforms alone: the base of the
-    /// machine that carries a sensor. The frame itself if it hangs below none, `None` if it is unknown.
+    /// Highest ancestor of a frame over static transforms only: the base of the machine that carries a sensor.
+    ///
+    /// The frame itself if it has no static parent, `None` if it is unknown.
     pub fn static_root(&self, frame: &str) -> Option<&str> {
         let id = self.frames.find(bare(frame))?;
         Some(self.frames.name(self.frames.static_root(id)))
@@ -190,19 +188,19 @@ impl TransformBuffer {
         self.frames.len()
     }
 
-    /// True if there is no frame.
+    /// Tests whether there is no frame.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Forgets the history of a moving frame in one of its parents; frames and static transforms stay.
+    /// Drops the history of a dynamic frame in one of its parents; frames and static transforms stay.
     pub fn clear_link(&mut self, parent: &str, child: &str) {
         if let Some(track) = self.frames.track_mut(bare(parent), bare(child)) {
             track.clear();
         }
     }
 
-    /// Checks names, links, bounds and samples; for tests.
+    /// Validates names, links, bounds and samples; for tests.
     pub fn validate(&self) -> Result<(), String> {
         self.frames.validate(self.max_samples)
     }

@@ -1,18 +1,18 @@
-//! Ways through the frames, by way of a common ancestor.
+//! Paths between frames over a common ancestor.
 
-/// Most frames above a frame that are looked at.
+/// Maximum number of visited ancestors.
 const MAX_ABOVE: usize = 32;
 
-/// A frame above another one; small, since every lookup makes two lists of them.
+/// Ancestor of a frame; small, since every lookup makes two lists of them.
 #[derive(Clone, Copy, Debug, Default)]
 struct Step {
     frame: u32,
-    /// Place of the frame below.
+    /// Index of the frame below.
     from: u8,
     depth: u8,
 }
 
-/// A frame and those above it, the nearest first.
+/// Frame and its ancestors, the nearest first.
 #[derive(Clone, Debug)]
 struct Above {
     steps: [Step; MAX_ABOVE],
@@ -40,7 +40,7 @@ impl Above {
 
     fn push(&mut self, frame: usize, from: usize, depth: u8) {
         if let (Some(slot), Ok(frame)) = (self.steps.get_mut(self.len), u32::try_from(frame)) {
-            // A place is below `MAX_ABOVE`.
+            // An index is below `MAX_ABOVE`.
             let from = from as u8;
             *slot = Step { frame, from, depth };
             self.len += 1;
@@ -56,7 +56,7 @@ impl Above {
         steps.position(|step| step.frame as usize == frame)
     }
 
-    /// Links as frame and parent, from a place down to the first frame.
+    /// Links (frame, parent) from an index down to the first frame.
     fn down(&self, mut place: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
         std::iter::from_fn(move || {
             let upper = self.steps().get(place).filter(|_| place > 0)?;
@@ -67,17 +67,17 @@ impl Above {
     }
 }
 
-/// The way between two frames up to their common ancestor.
+/// Path between two frames over their common ancestor.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
     target: Above,
     source: Above,
-    /// Places of the ancestor in both.
+    /// Indices of the ancestor in both lists.
     ancestor: [usize; 2],
 }
 
 impl Path {
-    /// The shortest way; of equally short ones that which climbs least from the source.
+    /// Shortest path; of equally short ones the one with the fewest links from the source.
     pub fn find<P: Iterator<Item = usize>>(
         target: usize,
         source: usize,
@@ -97,12 +97,12 @@ impl Path {
         })
     }
 
-    /// Links as frame and parent, from the ancestor down to the target.
+    /// Links (frame, parent) from the ancestor down to the target.
     pub fn to_target(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.target.down(self.ancestor[0])
     }
 
-    /// Links as frame and parent, from the ancestor down to the source.
+    /// Links (frame, parent) from the ancestor down to the source.
     pub fn to_source(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.source.down(self.ancestor[1])
     }

@@ -1,6 +1,6 @@
-//! Likelihood of a pose given a source and a target, by which all candidates are judged.
+//! Likelihood of a pose given a source and a target, which ranks all candidates.
 
-mod chance;
+mod indistinct;
 mod partners;
 
 use nalgebra::Point3;
@@ -9,32 +9,32 @@ use super::PreparedCloud;
 use super::confusion::{Confusion, Counts, Lift};
 use partners::CLOSENESS;
 
-pub use chance::Even;
-pub(super) use chance::quantile;
+pub use indistinct::IndistinctDifference;
+pub(super) use indistinct::quantile;
 pub use partners::Partners;
 
-/// Share of source points that have a partner in the target.
+/// Prior fraction of inliers.
 const INLIERS: f64 = 0.8;
-/// Density of points on a surface of the map over that anywhere else.
+/// Ratio of the density of inliers on a surface to that of outliers.
 const CONTRAST: f64 = 25.0;
-/// Parts of the source that labels are judged by while they are learned from the others.
+/// Cross-validation folds of the label co-occurrence.
 const FOLDS: usize = 5;
-/// Points of a region that count as independent, at most.
+/// Maximum number of independent points per region.
 const INDEPENDENT: f64 = 4.0;
 
-/// Deviations within which points are expected to agree.
+/// Expected standard deviations of residuals.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FitScale {
     /// Standard deviation across a surface, metres.
     pub normal_m: f64,
-    /// Standard deviation along a surface, metres: about the spacing of the map's points.
+    /// Standard deviation along a surface, metres; near the spacing of the map's points.
     pub tangent_m: f64,
-    /// Side of the regions that count as one observation each, metres.
+    /// Side of the regions that limit independent points, metres.
     pub region_m: f64,
 }
 
 impl FitScale {
-    /// For a map whose points are about `spacing_m` apart and clouds with `noise_m` of their own.
+    /// Deviations for a map with point spacing `spacing_m` and clouds with `noise_m` of their own.
     pub fn new(spacing_m: f64, noise_m: f64) -> FitScale {
         FitScale {
             normal_m: (0.25 * spacing_m).hypot(noise_m),
@@ -43,7 +43,7 @@ impl FitScale {
         }
     }
 
-    /// The same for points that are refined only roughly.
+    /// Scales the deviations by `factor`, for coarsely refined poses.
     pub fn coarser(self, factor: f64) -> FitScale {
         FitScale {
             normal_m: self.normal_m * factor,
@@ -52,40 +52,40 @@ impl FitScale {
         }
     }
 
-    /// Farthest that a partner may be, metres.
+    /// Maximum distance of correspondences, metres.
     pub fn gate_m(&self) -> f64 {
         3.0 * self.tangent_m.max(self.normal_m)
     }
 }
 
-/// The source, cut into regions, ready to be judged at many poses.
+/// Likelihood model: a source divided into regions, and a target.
 pub struct Fit<'a> {
     source: &'a PreparedCloud,
     target: &'a PreparedCloud,
     scale: FitScale,
-    /// Weight of each source point; points of a crowded region share what it counts.
+    /// Weight of each source point: points of a dense region share its weight.
     weights: Vec<f64>,
     folds: Vec<u8>,
 }
 
-/// Log-likelihood of a pose; each observation adds 0 where it lies on the map as often as by chance.
+/// Log-likelihood of a pose relative to that of random points.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Likelihood {
-    /// By the surfaces alone.
+    /// Part of the surfaces.
     pub surfaces: f64,
-    /// Part of the labels, each judged by what the others taught.
+    /// Part of the labels, cross-validated between folds.
     pub labels: f64,
 }
 
 impl Likelihood {
-    /// Log-likelihood by surfaces and labels.
+    /// Total log-likelihood.
     pub fn total(&self) -> f64 {
         self.surfaces + self.labels
     }
 }
 
 impl<'a> Fit<'a> {
-    /// Cuts a source into regions, to be judged in a target.
+    /// Divides a source into regions.
     pub fn new(source: &'a PreparedCloud, target: &'a PreparedCloud, scale: FitScale) -> Fit<'a> {
         let regions: Vec<[i64; 3]> = (source.points_m().iter())
             .map(|point| region_of(point, scale.region_m))
@@ -114,20 +114,21 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Independent observations in the source.
+    /// Effective number of independent observations in the source.
     pub fn observations(&self) -> f64 {
         self.weights.iter().sum()
     }
 
-    /// Log-likelihood of a pose that puts no point near the target.
-    pub fn nowhere(&self) -> f64 {
+    /// Log-likelihood of a pose at which all points are outliers.
+    pub fn outlier_log_likelihood(&self) -> f64 {
         self.observations() * log_density(0.0)
     }
 
-    /// Likelihood of a pose whose partners these are. How close surfaces are is learned from the pose, up
-    /// to the expected closeness: one that fits better than it had to is the likelier. Labels count as far
-    /// as `known` and what the other folds teach predict them; `agreement` as in [`Confusion::lift`]. With
-    /// it comes what the pose teaches about the labels.
+    /// Log-likelihood of a pose with given correspondences, and the label co-occurrence learned at it.
+    ///
+    /// The deviation across surfaces is estimated at the pose, up to the expected one: a pose with smaller residuals
+    /// is more likely. Labels contribute as far as `known` and the co-occurrence in the other folds predict them;
+    /// `agreement` is as in [`Confusion::lift`].
     pub fn likelihood(
         &self,
         partners: &Partners,
@@ -168,33 +169,33 @@ impl<'a> Fit<'a> {
         self.weight(i) * log_density(labelled)
     }
 
-    /// Log-likelihood by surfaces at the closeness of surfaces that fits best, and that closeness; the
-    /// widest of equal ones.
+    /// Largest log-likelihood by surfaces over the [`CLOSENESS`] values, with that value; the first of equal ones.
     fn closest(&self, partners: &Partners) -> (f64, f64) {
         let parts = self.by_surfaces(partners).into_iter().zip(CLOSENESS);
         let better = |a: (f64, f64), b: (f64, f64)| if b.0 > a.0 { b } else { a };
         parts.fold((f64::NEG_INFINITY, 1.0), better)
     }
 
+    /// Weight of a source point.
     fn weight(&self, i: usize) -> f64 {
         self.weights.get(i).copied().unwrap_or(0.0)
     }
 
-    /// Log-likelihood by surfaces at each of the [`CLOSENESS`].
+    /// Log-likelihood by surfaces at each of the [`CLOSENESS`] values.
     fn by_surfaces(&self, partners: &Partners) -> [f64; CLOSENESS.len()] {
-        let nowhere = log_density(0.0);
+        let outlier = log_density(0.0);
         let mut sums = [0.0; CLOSENESS.len()];
         for (near, weight) in partners.of_point.iter().zip(&self.weights) {
             let mut nearness = [0.0; CLOSENESS.len()];
             let near = near.iter().filter(|p| p.beside > 0.0);
             near.for_each(|partner| partner.add_to(&mut nearness));
-            // Without a partner all are 0, and none needs a logarithm.
+            // Without a correspondence all are 0 and need no logarithm.
             let [widest, ..] = nearness;
             let density = |n: f64| {
                 if widest > 0.0 {
                     log_density(n)
                 } else {
-                    nowhere
+                    outlier
                 }
             };
             for (sum, nearness) in sums.iter_mut().zip(nearness) {
@@ -204,7 +205,7 @@ impl<'a> Fit<'a> {
         sums
     }
 
-    /// Labels seen in one place, by fold; none where one cloud has none.
+    /// Label co-occurrence counts by fold; empty if a cloud is unlabelled.
     fn count(&self, partners: &Partners, closeness: f64) -> Vec<Counts> {
         if !self.source.is_labelled() || !self.target.is_labelled() {
             return Vec::new();
@@ -214,7 +215,7 @@ impl<'a> Fit<'a> {
             let fold = self.folds.get(i).copied().unwrap_or(0);
             let label = self.source.label(i);
             let sum: f64 = near.iter().map(|p| p.nearness(closeness)).sum();
-            // Share of the source point that is on the map at all.
+            // Posterior probability that the source point is an inlier.
             let share = INLIERS * CONTRAST / (1.0 - INLIERS + INLIERS * CONTRAST * sum);
             for partner in near.iter().filter(|p| p.beside > 0.0) {
                 let target = self.target.label(partner.target as usize);
@@ -228,12 +229,12 @@ impl<'a> Fit<'a> {
     }
 }
 
-/// Region of a side that a point is in.
+/// Index of the cubic region of side `side_m` that contains a point.
 pub(super) fn region_of(point: &Point3<f64>, side_m: f64) -> [i64; 3] {
     [point.x, point.y, point.z].map(|c| (c / side_m).floor() as i64)
 }
 
-/// The lift to judge each fold by: what is known and what the others teach.
+/// Lift for each fold, from the prior and the other folds.
 fn lifts(counts: &[Counts], known: &Confusion, agreement: f64) -> Vec<Lift> {
     let lift = |fold: usize| {
         let others = counts.iter().enumerate().filter(|(i, _)| *i != fold);
@@ -243,13 +244,14 @@ fn lifts(counts: &[Counts], known: &Confusion, agreement: f64) -> Vec<Lift> {
     (0..counts.len()).map(lift).collect()
 }
 
+/// Merges counts.
 fn sum<'a>(counts: impl Iterator<Item = &'a Counts>) -> Confusion {
     let mut all = Counts::default();
     counts.for_each(|counts| all.add_all(counts));
     all.confusion()
 }
 
-/// Log of a mixture of partners and of a point anywhere.
+/// Log-density of the mixture of inliers and outliers.
 fn log_density(nearness: f64) -> f64 {
     (1.0 - INLIERS + INLIERS * CONTRAST * nearness).ln()
 }

@@ -1,4 +1,4 @@
-//! Partners of source points in the target at a pose.
+//! Correspondences of source points in the target at a pose.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
@@ -6,11 +6,10 @@ use rayon::prelude::*;
 use super::super::Neighbors;
 use super::Fit;
 
-/// Target points that a source point may belong to.
+/// Correspondences per source point.
 const NEIGHBORS: usize = 4;
 
-/// Deviations across surfaces that a pose may turn out to have, as parts of the expected one: each variance is half of
-/// the one before.
+/// Tested ratios of the deviation across surfaces to the expected one; each halves the variance.
 pub(super) const CLOSENESS: [f64; 5] = [
     1.0,
     std::f64::consts::FRAC_1_SQRT_2,
@@ -19,13 +18,14 @@ pub(super) const CLOSENESS: [f64; 5] = [
     0.25,
 ];
 
-/// A target point that a source point may belong to.
+/// Correspondence of a source point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Partner {
+    /// Index of the target point.
     pub target: u32,
-    /// Likelihood that they are one place by all but their distance across the surface, 1 at most.
+    /// Likelihood from the distance along the surface and the normals, at most 1.
     pub beside: f64,
-    /// Squared distance across the surface in expected deviations.
+    /// Squared Mahalanobis distance across the surface.
     across: f64,
 }
 
@@ -36,18 +36,18 @@ impl Partner {
         across: 0.0,
     };
 
-    /// Adds the likelihoods that they are one place by each of the [`CLOSENESS`].
+    /// Adds the likelihood at each of the [`CLOSENESS`] values.
     pub fn add_to(&self, nearness: &mut [f64; CLOSENESS.len()]) {
         let mut across = (-0.5 * self.across).exp();
         for (sum, closeness) in nearness.iter_mut().zip(CLOSENESS) {
             *sum += self.beside / closeness * across;
-            // Half of a variance squares it.
+            // Halving the variance squares the exponential.
             across *= across;
         }
     }
 
-    /// Likelihood that they are one place, if the deviation across surfaces is `closeness` of the expected
-    /// one; 1 over that at most.
+    /// Likelihood of the correspondence if the deviation across surfaces is `closeness` times the expected one; at
+    /// most `1 / closeness`.
     pub fn nearness(&self, closeness: f64) -> f64 {
         if self.beside > 0.0 {
             self.beside / closeness * (-0.5 * self.across / (closeness * closeness)).exp()
@@ -57,22 +57,22 @@ impl Partner {
     }
 }
 
-/// Source points with their partners at a pose.
+/// Correspondences of all source points at a pose.
 pub struct Partners {
     pub(super) of_point: Vec<[Partner; NEIGHBORS]>,
-    /// Root mean square distance across the surfaces of points with a partner, metres.
+    /// RMS distance of inliers across the surfaces, metres.
     pub rmse_m: f64,
-    /// Share of the points that have a partner.
+    /// Fraction of inliers.
     pub inlier_fraction: f64,
 }
 
 impl Fit<'_> {
-    /// Finds the partners of all source points.
+    /// Finds the correspondences of all source points.
     pub fn partners(&self, target_from_source: &Isometry3<f64>) -> Partners {
         self.partners_at(&target_from_source.rotation, |p| target_from_source * p)
     }
 
-    /// The same with the distances of the points from a centre multiplied by a scale; regions and weights stay.
+    /// Finds the correspondences with the points scaled about a centre; regions and weights stay.
     pub fn partners_scaled(
         &self,
         target_from_source: &Isometry3<f64>,
@@ -109,7 +109,7 @@ impl Fit<'_> {
         }
     }
 
-    /// Partners of a point at its place, and its squared distance across the surface of the nearest.
+    /// Correspondences of a point at its place, and the squared distance across the nearest surface.
     fn partners_of(
         &self,
         i: usize,

@@ -1,5 +1,5 @@
-//! A cloud ready to be registered: nearest neighbours ([`kd_tree`](crate::kd_tree)), normals ([`plane`]) of its
-//! surface ([`surface`]), and labels.
+//! Prepared clouds: nearest neighbours ([`kd_tree`](crate::kd_tree)), surface normals ([`plane`], [`surface`]) and
+//! labels.
 
 mod plane;
 pub(super) mod surface;
@@ -15,19 +15,19 @@ use surface::Surface;
 use super::{LabelDistribution, RegistrationError, SemanticCloud, UNLABELED};
 use crate::kd_tree::{MAX_NEIGHBORS, Nearest, Neighbors};
 
-/// Largest coordinate that is taken, metres.
+/// Largest accepted coordinate, metres.
 pub const MAX_COORDINATE_M: f64 = 1e8;
-/// Neighbours whose labels are blurred into one, as the authors of Semantic-ICP do.
+/// Neighbours whose labels are averaged, as in the code of the Semantic-ICP authors.
 const BLUR: usize = 20;
 
-/// Options for preparing a cloud.
+/// Options of the preparation of a cloud.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PrepareOptions {
-    /// Points of the neighbourhood of a covariance, the point itself among them.
+    /// Number of points in the neighbourhood of a covariance, the point itself included.
     pub neighbors: usize,
-    /// Variance across the plane, where those along it are 1 m^2.
+    /// Variance across the plane, relative to 1 m^2 along it.
     pub plane_epsilon: f64,
-    /// Fewest points of a cloud.
+    /// Minimum number of points of a cloud.
     pub min_points: usize,
 }
 
@@ -42,10 +42,10 @@ impl Default for PrepareOptions {
     }
 }
 
-/// A cloud ready to be registered: points, plane-regularised covariances, nearest neighbours, labels.
+/// Point cloud with plane-regularized covariances, a k-d tree and labels.
 ///
-/// Points are kept in the order of the tree, near points near each other; indices are places in this
-/// order and [`order`](Self::order) has the place of each in the cloud.
+/// Points are in the order of the tree, which places neighbours close to each other. Indices refer to this order;
+/// [`order`](Self::order) maps them to the input cloud.
 pub struct PreparedCloud {
     surface: Surface,
     labels: Vec<LabelDistribution>,
@@ -55,7 +55,7 @@ pub struct PreparedCloud {
 }
 
 impl PreparedCloud {
-    /// Builds the tree and the covariances; the same on any number of threads.
+    /// Builds the tree and the covariances; the result is the same on any number of threads.
     pub fn new(
         cloud: SemanticCloud,
         options: &PrepareOptions,
@@ -77,7 +77,7 @@ impl PreparedCloud {
         })
     }
 
-    /// The cloud with the normals that are known for points, by their places in the cloud that was prepared.
+    /// Replaces normals by known ones, given by the index in the input cloud.
     pub(super) fn with_normals(
         mut self,
         normal: impl Fn(usize) -> Option<Vector3<f64>>,
@@ -94,7 +94,7 @@ impl PreparedCloud {
         self.surface.points_m.len()
     }
 
-    /// True if there is no point; never, for a prepared cloud.
+    /// Tests whether there are no points; never true for a prepared cloud.
     pub fn is_empty(&self) -> bool {
         self.surface.points_m.is_empty()
     }
@@ -104,12 +104,12 @@ impl PreparedCloud {
         &self.surface.points_m
     }
 
-    /// Place of each point in the cloud that was prepared.
+    /// Index of each point in the input cloud.
     pub fn order(&self) -> &[u32] {
         &self.surface.order
     }
 
-    /// Unit normals of the planes through the neighbourhoods; their signs are arbitrary.
+    /// Unit normals of the planes fitted to the neighbourhoods; their signs are arbitrary.
     pub fn normals(&self) -> &[Vector3<f64>] {
         &self.surface.normals
     }
@@ -121,12 +121,12 @@ impl PreparedCloud {
         self.surface.normals.iter().map(covariance)
     }
 
-    /// Variance across the planes, where those along them are 1 m^2.
+    /// Variance across the planes, relative to 1 m^2 along them.
     pub fn plane_epsilon(&self) -> f64 {
         self.options.plane_epsilon
     }
 
-    /// True if the cloud came with labels.
+    /// Tests whether the cloud has labels.
     pub fn is_labelled(&self) -> bool {
         !self.labels.is_empty()
     }
@@ -137,8 +137,7 @@ impl PreparedCloud {
         label.unwrap_or(LabelDistribution::UNKNOWN)
     }
 
-    /// The nearest point and its squared distance (m^2), at most `max_distance_m` away; of equally near
-    /// points the one with the lowest index.
+    /// Nearest point within `max_distance_m` and its squared distance (m^2); of equally near points the lowest index.
     pub fn nearest(&self, query: &Point3<f64>, max_distance_m: f64) -> Option<(usize, f64)> {
         let mut nearest = Nearest {
             index: u32::MAX,
@@ -148,7 +147,7 @@ impl PreparedCloud {
         (nearest.index != u32::MAX).then_some((nearest.index as usize, nearest.squared))
     }
 
-    /// The `k` nearest points (at most [`MAX_NEIGHBORS`]), at most `max_distance_m` away.
+    /// Finds up to `k` nearest points (at most [`MAX_NEIGHBORS`]) within `max_distance_m`.
     pub fn nearest_k(
         &self,
         query: &Point3<f64>,
@@ -164,13 +163,14 @@ impl PreparedCloud {
         &self.surface
     }
 
-    /// Label distributions, one for each point or none.
+    /// Label distributions: one per point, or none.
     pub(super) fn labels(&self) -> &[LabelDistribution] {
         &self.labels
     }
 
-    /// The points of each class, by their most probable one, with trees and covariances of their own; made
-    /// when first asked for. Classes with fewer points than a neighbourhood are left out.
+    /// Points of each class, by the most probable label, with their own trees and covariances; built on first use.
+    ///
+    /// Classes with fewer points than a neighbourhood are dropped.
     pub(super) fn classes(&self) -> &[(u16, Surface)] {
         self.classes.get_or_init(|| {
             let mut of_class: BTreeMap<u16, Vec<Point3<f64>>> = BTreeMap::new();
@@ -187,7 +187,7 @@ impl PreparedCloud {
         })
     }
 
-    /// Shares of the most probable classes of the nearest points of each point; made when first asked for.
+    /// Fractions of the most probable classes among the nearest points of each point; built on first use.
     pub(super) fn blurred_labels(&self) -> &[LabelDistribution] {
         self.blurred.get_or_init(|| {
             if self.labels.is_empty() {
@@ -212,7 +212,7 @@ impl PreparedCloud {
     }
 }
 
-/// Square of a distance; a bound that nothing is within for what is not a distance.
+/// Square of a distance; negative for an invalid distance, so that no point is within it.
 pub(super) fn squared_reach(max_distance_m: f64) -> f64 {
     if max_distance_m >= 0.0 {
         (max_distance_m * max_distance_m).min(f64::MAX)
@@ -221,6 +221,7 @@ pub(super) fn squared_reach(max_distance_m: f64) -> f64 {
     }
 }
 
+/// Checks a cloud and its options.
 fn check(cloud: &SemanticCloud, options: &PrepareOptions) -> Result<(), RegistrationError> {
     let (points, labels) = (cloud.len(), cloud.labels.len());
     let (least, most) = (options.min_points.max(3), u32::MAX as usize / 2);

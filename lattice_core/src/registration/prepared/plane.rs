@@ -1,14 +1,14 @@
-//! Planes through neighbourhoods.
+//! Planes fitted to neighbourhoods.
 
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 
-/// Below this share of the fourth power of the scatter the closed form has lost its digits.
+/// Squared magnitude relative to the fourth power of the scatter below which the closed form is imprecise.
 const DEGENERATE: f64 = 1e-20;
 
 /// Scatter (mean product of the deviations, m^2) of points.
 pub(super) fn scatter(points_m: impl Iterator<Item = Point3<f64>>) -> Matrix3<f64> {
     let mut points_m = points_m.peekable();
-    // About the first point, so that coordinates far from the origin keep their digits.
+    // Relative to the first point, so that coordinates far from the origin keep their digits.
     let Some(about) = points_m.peek().copied() else {
         return Matrix3::zeros();
     };
@@ -37,7 +37,7 @@ pub(super) fn scatter(points_m: impl Iterator<Item = Point3<f64>>) -> Matrix3<f6
     Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 
-/// Unit eigenvector of the smallest eigenvalue of a scatter; its sign is arbitrary but always the same.
+/// Unit eigenvector of the smallest eigenvalue of a scatter; its sign is arbitrary but deterministic.
 pub(super) fn normal(scatter: &Matrix3<f64>) -> Vector3<f64> {
     let third = scatter.trace() / 3.0;
     if third.is_nan() || third <= 0.0 {
@@ -69,7 +69,7 @@ pub(super) fn normal(scatter: &Matrix3<f64>) -> Vector3<f64> {
     eigen.eigenvectors.column(smallest).into_owned()
 }
 
-/// True if points with this scatter and size all lie on one line, up to rounding.
+/// Tests whether points with this scatter and extent are collinear, up to rounding.
 pub(super) fn is_line(scatter: &Matrix3<f64>, largest_m: f64) -> bool {
     let mut eigenvalues = scatter.symmetric_eigenvalues();
     eigenvalues.as_mut_slice().sort_by(f64::total_cmp);

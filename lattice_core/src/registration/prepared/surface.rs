@@ -1,4 +1,4 @@
-//! Points with normals and a tree: a whole cloud, or one class of it.
+//! Points with normals and a k-d tree: a whole cloud, or one class of it.
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -6,16 +6,16 @@ use rayon::prelude::*;
 use super::plane;
 use crate::kd_tree::{Item, Neighbors, Tree};
 
-/// Points of one piece of parallel work.
+/// Points per parallel task.
 const CHUNK: usize = 512;
-/// More than what rounding takes from a sum of distances.
+/// Factor above the rounding error of a sum of distances.
 const SLACK: f64 = 1.0 + 1e-12;
 
-/// Points in the order of their tree, with the normals of the planes around them.
+/// Points in the order of their tree, with the normals of their neighbourhoods.
 pub(crate) struct Surface {
     pub points_m: Vec<Point3<f64>>,
     pub normals: Vec<Vector3<f64>>,
-    /// Place of each point in what the surface was made of.
+    /// Index of each point in the input.
     pub order: Vec<u32>,
     pub tree: Tree,
 }
@@ -39,8 +39,9 @@ impl Surface {
     }
 }
 
-/// The neighbours of the last point bound how far those of the next can be: points follow each other
-/// closely, so most searches begin with almost their final reach.
+/// Computes the normals.
+///
+/// Consecutive points are close, so the neighbours of the last point bound the search radius of the next one.
 fn normals(tree: &Tree, points_m: &[Point3<f64>], neighbors: usize) -> Vec<Vector3<f64>> {
     let mut normals = vec![Vector3::zeros(); points_m.len()];
     let chunks = normals

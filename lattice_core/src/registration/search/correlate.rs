@@ -1,4 +1,4 @@
-//! All positions of a turned cloud in the map at once.
+//! Correlation of a rotated cloud with the map at all positions.
 
 use nalgebra::{Rotation3, Vector3};
 
@@ -6,35 +6,34 @@ use super::field::Field;
 use super::grid::rounded;
 use crate::lattice::Simd;
 
-/// A heading and a place that the source fits, and how well.
+/// Peak of the correlation.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Peak {
     /// Sum of the scores of the points.
     pub score: u32,
-    /// Turn about the vertical, radians.
+    /// Heading, radians.
     pub yaw_rad: f64,
-    /// Place of the source's reference point in the map, metres.
+    /// Position of the reference point of the source in the map, metres.
     pub place_m: Vector3<f64>,
 }
 
-/// Part of the grid that the reference point may be in: first cell and number of cells.
+/// Range of cells that may contain the reference point: first cell and number of cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
     pub first: [usize; 3],
     pub dims: [usize; 3],
 }
 
-/// The best places of the source's reference point for one heading.
+/// Finds the best positions of the reference point for one heading.
 ///
-/// `points` are relative to the reference point, in the source frame, with the channel of each at this
-/// heading; at most `looked_at` cells of them count. At most `most` local maxima come back, the best
-/// first.
+/// `points` are relative to the reference point, in the source frame, with their channels at this heading. At most
+/// `max_cells` cells of them are used. Returns up to `most` local maxima, sorted by descending score.
 pub(super) fn best_places(
     field: &Field,
     points: impl Iterator<Item = (Vector3<f64>, usize)>,
     yaw_rad: f64,
     window: Window,
-    (looked_at, most): (usize, usize),
+    (max_cells, most): (usize, usize),
 ) -> Vec<Peak> {
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
     let mut steps: Vec<(usize, [i64; 3])> = points
@@ -46,7 +45,7 @@ pub(super) fn best_places(
     // Each occupied cell of the source counts once.
     steps.sort_unstable_by_key(|(channel, [x, y, z])| (*channel, *z, *y, *x));
     steps.dedup();
-    let stride = steps.len().div_ceil(looked_at.max(1)).max(1);
+    let stride = steps.len().div_ceil(max_cells.max(1)).max(1);
     let steps: Vec<_> = steps.into_iter().step_by(stride).collect();
     let sums = sum_all(field, &steps, window);
     maxima(&sums, window.dims, most)
@@ -61,20 +60,20 @@ pub(super) fn best_places(
         .collect()
 }
 
-/// Score of every cell of the window: rows of the field, shifted by the step of each point, added up.
+/// Scores of all cells of the window: the sum of rows of the field, shifted by each point.
 ///
-/// Zero for rows that leave less than half of the points within the field.
+/// Zero for rows with less than half of the points inside the field.
 fn sum_all(field: &Field, steps: &[(usize, [i64; 3])], window: Window) -> Vec<u16> {
     #[cfg(target_arch = "x86_64")]
     if Simd::detect() == Simd::Avx2 {
-        // SAFETY: the machine has AVX2.
+        // SAFETY: AVX2 was detected.
         #[allow(unsafe_code)]
         return unsafe { sum_all_avx2(field, steps, window) };
     }
     sum_all_portably(field, steps, window)
 }
 
-/// The same code with wider vectors.
+/// [`sum_all_portably`] compiled for AVX2.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn sum_all_avx2(field: &Field, steps: &[(usize, [i64; 3])], window: Window) -> Vec<u16> {
@@ -88,7 +87,7 @@ fn sum_all_portably(field: &Field, steps: &[(usize, [i64; 3])], window: Window) 
     let rows: Vec<Row<'_>> = steps
         .iter()
         .filter_map(|(channel, [x, y, z])| {
-            // Cells of the field that the window's rows fall on.
+            // Cells of the field under the rows of the window.
             let x = window.first[0] as i64 + x;
             let [from, to] = [x, x + wx as i64].map(|x| x.clamp(0, nx as i64));
             Some(Row {
@@ -103,7 +102,7 @@ fn sum_all_portably(field: &Field, steps: &[(usize, [i64; 3])], window: Window) 
     let mut sums = vec![0_u16; wx * wy * wz];
     for (row, sums) in sums.chunks_exact_mut(wx.max(1)).enumerate() {
         let (row_y, row_z) = (row % wy, row / wy);
-        // What is before the first row comes out beyond any last one.
+        // An index before the first row wraps beyond the last one.
         let place = |step: &Row<'_>| {
             let (y, z) = (step.y.wrapping_add(row_y), step.z.wrapping_add(row_z));
             (y < ny && z < nz).then(|| (z * ny + y) * nx)
@@ -124,17 +123,17 @@ fn sum_all_portably(field: &Field, steps: &[(usize, [i64; 3])], window: Window) 
     sums
 }
 
-/// A row of the field that a point of the source lies in, with the first row of a window at its place.
+/// Row of the field at a source point, for the first row of the window.
 struct Row<'a> {
     scores: &'a [u8],
     y: usize,
     z: usize,
-    /// Cells of the row that the window falls on, and cells of the window before them.
+    /// Cells of the row under the window, and cells of the window before them.
     cells: std::ops::Range<usize>,
     skipped: usize,
 }
 
-/// Local maxima among 26 neighbours, the best first; of equal ones that with the lesser number.
+/// Local maxima among 26 neighbours, sorted by descending score; of equal ones the lower index wins.
 fn maxima(sums: &[u16], dims: [usize; 3], most: usize) -> Vec<(u32, [usize; 3])> {
     let [nx, ny, nz] = dims;
     let top = sums.iter().copied().max().unwrap_or(0);
@@ -170,7 +169,7 @@ mod tests {
     use super::*;
     use nalgebra::Point3;
 
-    /// The same by looking up every point at every place.
+    /// Reference implementation: looks up every point at every position.
     fn slow(field: &Field, steps: &[(usize, [i64; 3])], window: Window) -> Vec<u16> {
         let [wx, wy, wz] = window.dims;
         let mut sums = Vec::new();

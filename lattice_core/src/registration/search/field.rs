@@ -1,14 +1,13 @@
-//! Score of a source point at a place in the map.
+//! Scores of source points by their position in the map.
 
 use nalgebra::{Point3, Vector3};
 
 use super::grid::Grid;
 
-/// Score of a point in an occupied cell whose surface lies as the point's does.
+/// Score of a point in an occupied cell with the same surface orientation.
 pub(super) const FULL: u8 = 100;
 
-/// Score by orientation of the surface: one channel for level ones and one for each range of azimuth of
-/// upright ones, or by class of the source point.
+/// Scores by channel: horizontal surfaces and ranges of azimuth of vertical ones, or classes of source points.
 #[derive(Clone, Debug)]
 pub(super) struct Field {
     pub grid: Grid,
@@ -16,10 +15,10 @@ pub(super) struct Field {
     pub channels: Vec<Vec<u8>>,
 }
 
-/// Ranges of azimuth (modulo half a turn) of upright surfaces.
+/// Ranges of azimuth (modulo half a turn) of vertical surfaces.
 const AZIMUTHS: usize = 8;
 
-/// Direction of the surface at a point.
+/// Orientation of the surface at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Facing {
     Level,
@@ -35,7 +34,7 @@ impl Facing {
         }
     }
 
-    /// The channel of the surface turned by `yaw_rad`.
+    /// Channel of the surface rotated by `yaw_rad`.
     pub fn channel(self, yaw_rad: f64) -> usize {
         match self {
             Facing::Level => 0,
@@ -48,7 +47,7 @@ impl Facing {
 }
 
 impl Field {
-    /// Scores by the direction of surfaces: most for the same orientation, some for any, half of it one cell off.
+    /// Scores by orientation: the full score for equal orientation, a fraction for others, half in adjacent cells.
     pub fn of_surfaces(grid: Grid, points_m: &[Point3<f64>], normals: &[Vector3<f64>]) -> Field {
         let facing: Vec<usize> = (normals.iter())
             .map(|normal| Facing::of(normal).channel(0.0))
@@ -68,8 +67,8 @@ impl Field {
         })
     }
 
-    /// Scores of `channels` kinds of source points: `score(i, channel)` in the cell of map point `i`,
-    /// half of it in the six cells beside.
+    /// Scores of `channels` channels: `score(i, channel)` in the cell of map point `i`, half of it in the six
+    /// adjacent cells.
     pub fn build(
         grid: Grid,
         points_m: &[Point3<f64>],
@@ -93,7 +92,7 @@ impl Field {
         Field { grid, channels }
     }
 
-    /// Score of a kind of point at a place, zero beyond the box.
+    /// Score of a channel at a position; 0 outside the grid.
     #[inline]
     pub fn at(&self, channel: usize, place_m: &Vector3<f64>) -> u32 {
         let index = self.grid.index(self.grid.cell_of(place_m));
@@ -102,12 +101,12 @@ impl Field {
     }
 }
 
-/// Each cell takes half of the best of the six beside it, if that is more.
+/// Raises each cell to half of the largest score of its six neighbours.
 fn spread(grid: &Grid, own: &[u8]) -> Vec<u8> {
     let mut out = own.to_vec();
     let [nx, ny, _] = grid.dims;
     for step in [1, nx, nx * ny] {
-        // Rows end in margins, which are empty: what would run over into the next row is zero.
+        // Rows end in empty margins, so an overrun into the next row adds zero.
         for (i, &score) in own.iter().enumerate() {
             if score == 0 {
                 continue;

@@ -1,11 +1,11 @@
-//! Dense boxes of cubic cells around a map.
+//! Dense grid of cubic cells around a map.
 
 use nalgebra::{Point3, Vector3};
 
-/// Most cells of a box, which bounds memory and time whatever the map.
+/// Maximum number of cells, which bounds memory and time for any map.
 const MAX_CELLS: usize = 4_000_000;
 
-/// A box of cubic cells; cell `[x, y, z]` has number `(z * ny + y) * nx + x`.
+/// Grid of cubic cells; cell `[x, y, z]` has index `(z * ny + y) * nx + x`.
 #[derive(Clone, Debug)]
 pub(super) struct Grid {
     /// Centre of the first cell, metres.
@@ -17,8 +17,9 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// The smallest box around points with at least `margin` cells on all sides, its cells not smaller
-    /// than `cell_m` and as large as a bounded box needs. None without points.
+    /// Smallest grid around points with at least `margin` cells on all sides; `None` without points.
+    ///
+    /// Cells are `cell_m` or larger, to limit their number.
     pub fn around(points_m: &[Point3<f64>], cell_m: f64, margin: usize) -> Option<Grid> {
         let first = points_m.first()?.coords;
         let (low, high) = points_m.iter().fold((first, first), |(low, high), p| {
@@ -44,13 +45,13 @@ impl Grid {
         self.dims.iter().product()
     }
 
-    /// Cell coordinates of a place, rounded, beyond the box too.
+    /// Cell coordinates of a position, rounded; may lie outside the grid.
     pub fn cell_of(&self, place_m: &Vector3<f64>) -> [i64; 3] {
         let cell = (place_m - self.origin_m) / self.cell_m;
         [cell.x, cell.y, cell.z].map(rounded)
     }
 
-    /// Number of a cell, if it is in the box.
+    /// Index of a cell, if it is in the grid.
     pub fn index(&self, cell: [i64; 3]) -> Option<usize> {
         let [nx, ny, nz] = self.dims;
         let [x, y, z] = cell.map(|c| usize::try_from(c).unwrap_or(usize::MAX));
@@ -63,8 +64,9 @@ impl Grid {
     }
 }
 
-/// The nearest whole number, of two that are as near the farther from 0: `round`, without a call where the processor
-/// has no instruction for it.
+/// Rounds to the nearest integer, half away from zero, as `round` does.
+///
+/// Faster where the processor has no instruction for it.
 #[inline(always)]
 pub(super) fn rounded(value: f64) -> i64 {
     const HALF: f64 = 0.5 - f64::EPSILON / 4.0;

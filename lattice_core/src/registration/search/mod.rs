@@ -1,9 +1,8 @@
-//! Search for the place of a cloud in a map without a guess: all headings and places, gravity known.
+//! Search over all headings and positions of a cloud in a map, with known gravity.
 //!
-//! The source is turned about the vertical in steps and laid on a coarse grid of the map at every
-//! place at once (correlation of the points with scores of the cells); the best are climbed on a
-//! finer grid. The same with labels instead of surfaces gives a second set (after the map matching of
-//! Ryde and Hillier's MROL; gravity known as in Quatro, arXiv 2203.06612).
+//! The source is rotated about the vertical in steps. A coarse grid of map scores is correlated with it at all
+//! positions. The best peaks are refined by hill climbing on a finer grid. The same search by labels yields a second
+//! set of hypotheses. After the map matching of Ryde and Hillier's MROL; gravity as in Quatro (arXiv 2203.06612).
 
 mod correlate;
 mod field;
@@ -23,67 +22,68 @@ use super::PreparedCloud;
 
 pub use occupied::OccupiedGrid;
 
-const PLACES: usize = 24;
-/// Cells of the source that are laid on the coarse grid, at most; more add little.
-const LOOKED_AT: usize = 256;
-/// The same for a rough search, and for one by labels, which are of regions.
-const LOOKED_AT_ROUGHLY: usize = 96;
-const LOOKED_AT_BY_LABELS: usize = 128;
-/// Peaks that are climbed for each hypothesis that is wanted.
-const CLIMBED: usize = 3;
-/// Points that climbs look at, about.
+/// Peaks kept per heading.
+const PEAKS_PER_HEADING: usize = 24;
+/// Maximum number of source cells in the correlation; more add little.
+const MAX_CELLS: usize = 256;
+/// Maximum number of source cells in the rough search.
+const MAX_CELLS_ROUGH: usize = 96;
+/// Maximum number of source cells in the search by labels.
+const MAX_CELLS_BY_LABELS: usize = 128;
+/// Peaks refined per requested hypothesis.
+const CLIMBS_PER_HYPOTHESIS: usize = 3;
+/// Target number of points in hill climbing.
 const CLIMB_POINTS: usize = 200;
-/// Coarse cells of a map, about; a larger map gets larger ones.
+/// Target number of coarse cells; a larger map gets larger cells.
 const COARSE_CELLS: f64 = 200_000.0;
 
-/// Places and headings that the source may have.
+/// Region of poses that the search covers.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Region {
-    /// Pose in the middle, `target_from_source`.
+    /// Central pose, `target_from_source`.
     pub about: Isometry3<f64>,
-    /// Largest distance of the reference point from its place by that pose, metres.
+    /// Largest distance of the reference point from its central position, metres.
     pub radius_m: f64,
-    /// Largest error of the heading, radians.
+    /// Largest difference of the heading from the central one, radians.
     pub yaw_rad: f64,
 }
 
-/// A pose that the source fits.
+/// Pose hypothesis with its score.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hypothesis {
-    /// `target_from_source`; a turn about the vertical and a translation.
+    /// `target_from_source`: a rotation about the vertical and a translation.
     pub target_from_source: Isometry3<f64>,
-    /// Share of the full score, 0 to 1.
+    /// Fraction of the full score, 0 to 1.
     pub score: f64,
 }
 
-/// A map made ready to be searched.
+/// Map prepared for the search.
 #[derive(Clone, Debug)]
 pub struct SearchMap {
     coarse: Field,
     fine: Field,
-    /// Cells of the source that are laid on the coarse grid, at most.
-    looked_at: usize,
+    /// Maximum number of source cells in the correlation.
+    max_cells: usize,
 }
 
 impl SearchMap {
-    /// Prepares a map whose points are about `spacing_m` apart. None if it is empty.
+    /// Prepares a map with point spacing `spacing_m`, scored by surfaces; `None` if it is empty.
     pub fn of_surfaces(map: &PreparedCloud, spacing_m: f64) -> Option<SearchMap> {
         let (points, normals) = (map.points_m(), map.normals());
         let make = |grid| Field::of_surfaces(grid, points, normals);
-        SearchMap::build(points, spacing_m, LOOKED_AT, make)
+        SearchMap::build(points, spacing_m, MAX_CELLS, make)
     }
 
-    /// The same with cells twice as large, for a quick search that tells about how well a source fits.
+    /// Prepares a map with cells twice as large, for a fast estimate of the score.
     pub fn rough(map: &PreparedCloud, spacing_m: f64) -> Option<SearchMap> {
         let rough = SearchMap::of_surfaces(map, 2.0 * spacing_m)?;
         Some(SearchMap {
-            looked_at: LOOKED_AT_ROUGHLY,
+            max_cells: MAX_CELLS_ROUGH,
             ..rough
         })
     }
 
-    /// The same by `channels` classes of the source: `score(i, channel)` says what a source point of a
-    /// class scores, up to 100, on map point `i`.
+    /// Prepares a map scored by `channels` source classes: `score(i, channel)`, up to 100, at map point `i`.
     pub fn of_classes(
         map: &PreparedCloud,
         spacing_m: f64,
@@ -96,13 +96,13 @@ impl SearchMap {
         let score = |i: usize, channel: usize| scores.get(channel).and_then(|s| s.get(i));
         let score = |i, channel| score(i, channel).copied().unwrap_or(0);
         let make = |grid| Field::build(grid, points, channels, score);
-        SearchMap::build(points, spacing_m, LOOKED_AT_BY_LABELS, make)
+        SearchMap::build(points, spacing_m, MAX_CELLS_BY_LABELS, make)
     }
 
     fn build(
         points_m: &[Point3<f64>],
         spacing_m: f64,
-        looked_at: usize,
+        max_cells: usize,
         make: impl Fn(Grid) -> Field,
     ) -> Option<SearchMap> {
         let fine = Grid::around(points_m, 2.0 * spacing_m, 2)?;
@@ -111,12 +111,12 @@ impl SearchMap {
         Some(SearchMap {
             coarse: make(Grid::around(points_m, coarse_m, 2)?),
             fine: make(fine),
-            looked_at,
+            max_cells,
         })
     }
 }
 
-/// A source cloud made ready to be searched for.
+/// Source cloud prepared for the search.
 #[derive(Clone, Debug)]
 pub struct SearchSource {
     probe: Probe,
@@ -124,8 +124,9 @@ pub struct SearchSource {
 }
 
 impl SearchSource {
-    /// By the surfaces of a cloud; its reference point (the sensor if it is known, else the middle)
-    /// comes to lie within the box of the map.
+    /// Prepares a cloud for the search by surfaces.
+    ///
+    /// The reference point is the sensor if known, else the centroid; the search keeps it within the box of the map.
     pub fn by_surface(source: &PreparedCloud, sensor_m: Option<Point3<f64>>) -> SearchSource {
         let reference_m = reference(source, sensor_m);
         SearchSource {
@@ -134,7 +135,7 @@ impl SearchSource {
         }
     }
 
-    /// By the class channel of each point, if it has one.
+    /// Prepares a cloud for the search by classes; points without a channel are dropped.
     pub fn by_class(
         source: &PreparedCloud,
         sensor_m: Option<Point3<f64>>,
@@ -147,7 +148,7 @@ impl SearchSource {
         }
     }
 
-    /// The pose that turns by `yaw_rad` and puts the reference point at a place.
+    /// Pose with heading `yaw_rad` and the reference point at `place_m`.
     fn pose(&self, yaw_rad: f64, place_m: &Vector3<f64>) -> Isometry3<f64> {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad);
         let shift = place_m - turn * self.reference_m.coords;
@@ -155,6 +156,7 @@ impl SearchSource {
     }
 }
 
+/// Position of the sensor if known, else the centroid.
 fn reference(source: &PreparedCloud, sensor_m: Option<Point3<f64>>) -> Point3<f64> {
     sensor_m.unwrap_or_else(|| {
         let points = source.points_m();
@@ -163,9 +165,9 @@ fn reference(source: &PreparedCloud, sensor_m: Option<Point3<f64>>) -> Point3<f6
     })
 }
 
-/// The poses that a source fits best, the best first, at most `most`, all different.
+/// Finds up to `most` distinct poses, sorted by descending score.
 ///
-/// `region` narrows the search; without it all headings and the whole map are tried.
+/// `region` limits the search; without it all headings and the whole map are covered.
 pub fn search(
     map: &SearchMap,
     source: &SearchSource,
@@ -183,16 +185,16 @@ pub fn search(
     let mut peaks: Vec<Peak> = headings
         .into_par_iter()
         .flat_map_iter(|yaw| {
-            let most = (map.looked_at, PLACES);
+            let most = (map.max_cells, PEAKS_PER_HEADING);
             best_places(&map.coarse, probe.at_heading(yaw), yaw, window, most)
         })
         .collect();
     peaks.sort_by_key(|peak| std::cmp::Reverse(peak.score));
-    peaks.truncate(CLIMBED * most);
+    peaks.truncate(CLIMBS_PER_HYPOTHESIS * most);
     let mut found: Vec<(f64, f64, Vector3<f64>)> = peaks
         .par_iter()
         .map(|peak| {
-            climb(
+            hill_climb(
                 &map.fine,
                 probe,
                 peak.yaw_rad,
@@ -225,10 +227,10 @@ fn headings(step_rad: f64, region: Option<&Region>) -> Vec<f64> {
     let turn = std::f64::consts::TAU;
     match region {
         Some(region) if 2.0 * region.yaw_rad < turn => {
-            let middle = yaw_of(&region.about);
+            let center = yaw_of(&region.about);
             let half = (region.yaw_rad / step_rad).ceil() as i64;
             (-half..=half)
-                .map(|i| middle + i as f64 * step_rad)
+                .map(|i| center + i as f64 * step_rad)
                 .collect()
         }
         _ => {
@@ -238,7 +240,7 @@ fn headings(step_rad: f64, region: Option<&Region>) -> Vec<f64> {
     }
 }
 
-/// Cells that the reference point may be in.
+/// Cells that may contain the reference point.
 fn window(grid: &Grid, source: &SearchSource, region: Option<&Region>) -> Window {
     let Some(region) = region else {
         return Window {
@@ -246,11 +248,11 @@ fn window(grid: &Grid, source: &SearchSource, region: Option<&Region>) -> Window
             dims: grid.dims,
         };
     };
-    let middle = (region.about * source.reference_m).coords;
+    let center = (region.about * source.reference_m).coords;
     let reach = Vector3::repeat(region.radius_m);
     let (low, high) = (
-        grid.cell_of(&(middle - reach)),
-        grid.cell_of(&(middle + reach)),
+        grid.cell_of(&(center - reach)),
+        grid.cell_of(&(center + reach)),
     );
     let last = grid.dims.map(|n| n as i64 - 1);
     let first: [i64; 3] = std::array::from_fn(|a| low[a].clamp(0, last[a]));
@@ -260,20 +262,20 @@ fn window(grid: &Grid, source: &SearchSource, region: Option<&Region>) -> Window
     }
 }
 
-/// Turn about the vertical of a pose, radians.
+/// Heading of a pose about the vertical, radians.
 pub(in crate::registration) fn yaw_of(pose: &Isometry3<f64>) -> f64 {
     let x = pose.rotation * Vector3::x();
     x.y.atan2(x.x)
 }
 
-/// Least turn from one heading to another, radians.
+/// Smallest angle between two headings, radians.
 pub(in crate::registration) fn angle_between(a: f64, b: f64) -> f64 {
     let turn = (a - b).rem_euclid(std::f64::consts::TAU);
     turn.min(std::f64::consts::TAU - turn)
 }
 
-/// Goes uphill by halved steps from a heading and a place; score, heading and place of the top.
-fn climb(
+/// Hill climbing with halved steps from a heading and a position; returns the score, heading and position.
+fn hill_climb(
     field: &Field,
     probe: &Probe,
     mut yaw: f64,
@@ -306,6 +308,7 @@ fn climb(
     (probe.score(field, yaw, &place, 1), yaw, place)
 }
 
+/// Steps along both directions of all axes.
 fn axis_moves(step: f64) -> [Vector3<f64>; 6] {
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     std::array::from_fn(|i| axes[i / 2] * if i % 2 == 0 { step } else { -step })

@@ -1,39 +1,41 @@
-//! Grid of the surfaces, for lines of sight.
+//! Grid of surface facets, for lines of sight.
 
 use nalgebra::{Point3, Vector3};
 
 use super::grid::Grid;
 
+/// Minimum number of points of a facet.
 const MIN_POINTS: u32 = 3;
-/// Length of the mean of unit normals below which a cell holds an edge or clutter.
+/// Length of the mean normal below which a cell contains an edge or clutter.
 const FLAT: f32 = 0.8;
-/// Cosine between ray and normal below which a ray runs along a facet rather than through it.
+/// Cosine between ray and normal below which a ray is parallel to a facet.
 const STEEP: f64 = 0.4;
-/// Largest distance from the midst of a facet at which a ray goes through it, in cells.
+/// Largest distance of a crossing from the centroid of a facet, in cells.
 const REACH: f64 = 0.75;
-/// Distance from an edge within which a ray may pass it at a pose that is a little off, metres.
+/// Distance from an edge within which crossings are uncertain because of errors of the pose, metres.
 const EDGE_M: f64 = 0.1;
 
-/// Cells of a map with the facets of surfaces in them.
+/// Grid cells of a map with their surface facets.
 #[derive(Clone, Debug)]
 pub struct OccupiedGrid {
     grid: Grid,
-    /// Number of the facet of each cell, from 1; 0 for none.
+    /// Index of the facet of each cell, from 1; 0 for none.
     cells: Vec<u32>,
     facets: Vec<Facet>,
 }
 
+/// Planar facet in a cell.
 #[derive(Clone, Copy, Debug)]
 struct Facet {
-    middle_m: Point3<f32>,
-    /// Mean of the normals, all on one side.
+    centroid_m: Point3<f32>,
+    /// Mean of the normals, oriented to one side.
     normal: Vector3<f32>,
     points: u32,
 }
 
 impl OccupiedGrid {
-    /// Grid of points with unit normals, in cells of `cell_m`, or larger ones if the map is vast. None without
-    /// points.
+    /// Builds the grid from points with unit normals; cells grow if the map exceeds the maximum number of cells.
+    /// `None` without points.
     pub fn new(
         points_m: &[Point3<f64>],
         normals: &[Vector3<f64>],
@@ -52,7 +54,7 @@ impl OccupiedGrid {
                 Some(facet) => facet.add(&point, &normal),
                 None => {
                     facets.push(Facet {
-                        middle_m: point,
+                        centroid_m: point,
                         normal,
                         points: 1,
                     });
@@ -72,8 +74,9 @@ impl OccupiedGrid {
         self.grid.cell_m
     }
 
-    /// Distance along a ray, metres, at which it goes through the surface in the cell of a place on it. Rays along a
-    /// surface, past an edge or through clutter do not count.
+    /// Distance along a ray, metres, at which it crosses the facet in the cell of `place_m`.
+    ///
+    /// Rays parallel to a surface, near an edge or through clutter do not cross.
     pub fn crossing_m(
         &self,
         place_m: &Point3<f64>,
@@ -88,19 +91,19 @@ impl OccupiedGrid {
             return None;
         }
         let normal = (facet.normal / flatness).cast::<f64>();
-        let middle_m = facet.middle_m.cast::<f64>();
+        let centroid_m = facet.centroid_m.cast::<f64>();
         let steepness = normal.dot(direction);
         if steepness.abs() < STEEP {
             return None;
         }
-        let along_m = normal.dot(&(middle_m - from_m)) / steepness;
+        let along_m = normal.dot(&(centroid_m - from_m)) / steepness;
         let crossing_m = from_m + direction * along_m;
-        let is_near = (crossing_m - middle_m).norm() < REACH * self.grid.cell_m;
-        (is_near && self.goes_on_around(&crossing_m, &normal)).then_some(along_m)
+        let is_near = (crossing_m - centroid_m).norm() < REACH * self.grid.cell_m;
+        (is_near && self.is_surrounded(&crossing_m, &normal)).then_some(along_m)
     }
 
-    /// True if there is surface on all sides of a place on it: a pose that is a little off looks past edges.
-    fn goes_on_around(&self, place_m: &Point3<f64>, normal: &Vector3<f64>) -> bool {
+    /// Tests whether the surface extends to all sides of a place; small errors of the pose move rays past edges.
+    fn is_surrounded(&self, place_m: &Point3<f64>, normal: &Vector3<f64>) -> bool {
         let axis = Vector3::ith(normal.iamin(), 1.0);
         let along = normal.cross(&axis).normalize() * EDGE_M.min(self.grid.cell_m);
         let other = normal.cross(&along);
@@ -125,7 +128,7 @@ impl Facet {
         self.points = self.points.saturating_add(1);
         let share = 1.0 / self.points as f32;
         let side = normal.dot(&self.normal).signum();
-        self.middle_m += (point - self.middle_m) * share;
+        self.centroid_m += (point - self.centroid_m) * share;
         self.normal += (normal * side - self.normal) * share;
     }
 }

@@ -1,23 +1,23 @@
-//! The part of a source cloud that the search looks at.
+//! Sampled points of a source cloud.
 
 use nalgebra::{Point3, Vector3};
 
 use super::field::{FULL, Facing, Field};
 
-/// Points that the search looks at, at most: their scores fit into 16 bits.
+/// Maximum number of sampled points: the sum of their scores fits into 16 bits.
 const MAX_POINTS: usize = 600;
 
-/// A few points of the source about a reference point.
+/// Sampled source points relative to a reference point.
 #[derive(Clone, Debug)]
 pub(super) struct Probe {
     /// Points relative to the reference point, metres, in the source frame.
     points_m: Vec<Vector3<f64>>,
     kinds: Kinds,
-    /// Nine tenths of the points are not farther from the vertical through the reference, metres.
+    /// 90 % quantile of the distance from the vertical through the reference point, metres.
     pub radius_m: f64,
 }
 
-/// By what a point picks its channel.
+/// Source of the channel of each point.
 #[derive(Clone, Debug)]
 enum Kinds {
     Facing(Vec<Facing>),
@@ -25,7 +25,7 @@ enum Kinds {
 }
 
 impl Probe {
-    /// Points whose channel follows from their normals.
+    /// Samples points; channels follow from their normals.
     pub fn by_surface(
         points_m: &[Point3<f64>],
         normals: &[Vector3<f64>],
@@ -37,7 +37,7 @@ impl Probe {
         Probe::new(points_m, &picked, kinds, at)
     }
 
-    /// Points with given channels; those without one are left out.
+    /// Samples points with given channels; points without a channel are dropped.
     pub fn by_class(
         points_m: &[Point3<f64>],
         channels: &[Option<usize>],
@@ -74,7 +74,7 @@ impl Probe {
         self.points_m.len()
     }
 
-    /// The points with their channels at a heading.
+    /// Points with their channels at a heading.
     pub fn at_heading(&self, yaw_rad: f64) -> impl Iterator<Item = (Vector3<f64>, usize)> + '_ {
         let points = self.points_m.iter().enumerate();
         points.map(move |(i, p)| (*p, self.channel(i, yaw_rad)))
@@ -87,8 +87,7 @@ impl Probe {
         }
     }
 
-    /// Score with the reference at a place by one in `step` points, of one, which is a full score for
-    /// each of them.
+    /// Score at a heading and a position of the reference point, from every `step`-th point; 1 is the full score.
     pub fn score(&self, field: &Field, yaw_rad: f64, place_m: &Vector3<f64>, step: usize) -> f64 {
         let (sin, cos) = yaw_rad.sin_cos();
         let (mut sum, mut n) = (0, 0_u32);
@@ -101,7 +100,7 @@ impl Probe {
     }
 }
 
-/// Numbers of at most `MAX_POINTS` of `n` points, evenly spread.
+/// Indices of at most `MAX_POINTS` of `n` points, evenly spaced.
 fn picked(n: usize) -> Vec<usize> {
     let kept = n.min(MAX_POINTS);
     (0..kept).map(|i| i * n / kept).collect()

@@ -1,63 +1,65 @@
-//! Levenberg-Marquardt on SE(3), between searches for pairs.
+//! Levenberg-Marquardt on SE(3) with alternating correspondence searches.
 //!
-//! To be read in this order: this file has the loop, [`pairs`] finds the pairs of a pose,
-//! [`pair_weights`] weighs them, [`pair`] measures one, [`robust_kernel`] limits its cost,
-//! [`normal_equations`] sums up their linear system.
+//! Reading order: this file has the loop, [`correspondences`] finds the correspondences of a pose,
+//! [`correspondence_weights`] weights them, [`correspondence`] computes a residual, [`robust_kernel`] limits its
+//! cost, [`normal_equations`] accumulates the linear system.
 
+mod correspondence;
+mod correspondence_weights;
+mod correspondences;
 mod normal_equations;
-mod pair;
-mod pair_weights;
-mod pairs;
 mod robust_kernel;
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 
-use normal_equations::Sums;
-use pairs::Pairs;
+use correspondences::Correspondences;
+use normal_equations::NormalEquations;
 
 use super::{Method, PreparedCloud, RegisterOptions, SemanticVariant};
 use crate::pose::se3;
 
-/// Damping at the start as a share of the mean of the Hessian's diagonal, and its factor at each step.
+/// Initial damping relative to the mean of the Hessian's diagonal.
 const LAMBDA: f64 = 1e-6;
+/// Factor on the damping per accepted or rejected step.
 const LAMBDA_FACTOR: f64 = 10.0;
-/// Least damping, so that directions without information stay where they are.
-const LEAST_LAMBDA: f64 = 1e-12;
-/// Distance of the source from its origin up to which it turns about that, m. Farther off it turns about its middle:
-/// lever arms, whose squares are in the damping, are to be those of the cloud and not that of its place. At this one
-/// the first damping takes 0.3 % of a step along an axis, 1e-6 x 100^2 / 3.
+/// Minimum damping, so that degenerate directions do not move.
+const MIN_LAMBDA: f64 = 1e-12;
+/// Distance of the source centroid from its origin up to which rotations are about the origin, metres.
+///
+/// Beyond it, rotations are about the centroid, so that lever arms, whose squares enter the damping, do not depend on
+/// the position of the cloud. At this distance the first damping shortens a step along an axis by 0.3 % (1e-6 x 100^2
+/// / 3).
 const FAR_M: f64 = 100.0;
-/// Most dampings that are tried for one step.
-const TRIES: usize = 12;
-/// Share of the tolerances at which the steps between two searches end.
+/// Maximum number of dampings tried per step.
+const MAX_DAMPINGS: usize = 12;
+/// Fraction of the tolerances at which the steps between two searches converge.
 const INNER_SHARE: f64 = 1e-3;
 
 /// Result of a registration.
 ///
-/// `cost`, `inliers`, `rmse_m` and `hessian` are of the last pairs, before the last step.
+/// `cost`, `inliers`, `rmse_m` and `hessian` belong to the last correspondences, before the last step.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Registration {
-    /// Takes source points to the target frame.
+    /// Transform of source points to the target frame.
     pub target_from_source: Isometry3<f64>,
     /// True if the last step was below the tolerances.
     pub converged: bool,
-    /// Searches for pairs.
+    /// Number of correspondence searches.
     pub iterations: usize,
-    /// Value of the minimised cost.
+    /// Value of the minimized cost.
     pub cost: f64,
-    /// Source points with a pair.
+    /// Number of source points with a correspondence.
     pub inliers: usize,
-    /// Root of the weighted mean of the squared distances, metres.
+    /// Weighted RMS distance, metres.
     pub rmse_m: f64,
-    /// Half the Hessian of the cost, J^T W J, by a translation (m) and a rotation (rad) in the axes of the source.
+    /// Half the Hessian of the cost, J^T W J, by a translation (m) and a rotation (rad) along the axes of the source.
     pub hessian: Matrix6<f64>,
 }
 
-/// Registers `source` to `target` from a start.
+/// Registers `source` to `target` from an initial guess.
 ///
-/// Both may be anywhere: far from its origin the source turns about its middle. The same bytes on any number of
-/// threads. Without pairs, or from a start that is not finite, it ends
-/// where it began, not converged.
+/// The clouds may be far from their origins. The result is bit-identical on any number of threads. Without
+/// correspondences, or from a guess that is not finite, the guess is returned, not converged.
 pub fn register(
     source: &PreparedCloud,
     target: &PreparedCloud,
@@ -69,7 +71,7 @@ pub fn register(
         pose: *target_from_source_start,
         center,
         lambda: LAMBDA,
-        sums: Sums::default(),
+        sums: NormalEquations::default(),
     };
     let mut registration = Registration {
         target_from_source: state.pose,
@@ -84,7 +86,7 @@ pub fn register(
     if !finite(&state.pose) {
         return registration;
     }
-    let mut pairs = Pairs::new(source, target, options, center);
+    let mut pairs = Correspondences::new(source, target, options, center);
     let mut scale = match options.method {
         Method::Semantic(SemanticVariant::Em) if options.anneal < 1.0 => pairs.widest_scale(),
         _ => 1.0,
@@ -119,15 +121,15 @@ pub fn register(
 
 struct State {
     pose: Isometry3<f64>,
-    /// Point of the source about which it turns, m.
+    /// Centre of the rotations in the source, metres.
     center: Point3<f64>,
     lambda: f64,
-    sums: Sums,
+    sums: NormalEquations,
 }
 
 impl State {
-    /// Steps down the cost of these pairs; false if the first step went nowhere.
-    fn minimize(&mut self, pairs: &Pairs, options: &RegisterOptions) -> bool {
+    /// Minimizes the cost of fixed correspondences; false if no first step lowers it.
+    fn minimize(&mut self, pairs: &Correspondences, options: &RegisterOptions) -> bool {
         for inner in 0..options.inner_iterations.max(1) {
             if inner > 0 {
                 self.sums = pairs.linearize(&self.pose);
@@ -142,12 +144,12 @@ impl State {
         true
     }
 
-    /// A step that lowers the cost, or none at all where one below the tolerances does not; `None` if no
-    /// damping gives one.
-    fn step(&mut self, pairs: &Pairs, options: &RegisterOptions) -> Option<Vector6<f64>> {
+    /// Finds a step that lowers the cost, or a zero step if one below the tolerances does not; `None` if no damping
+    /// gives one.
+    fn step(&mut self, pairs: &Correspondences, options: &RegisterOptions) -> Option<Vector6<f64>> {
         let (h, b) = self.sums.system(&self.pose);
         let size = h.trace() / 6.0;
-        for attempt in 0..TRIES {
+        for attempt in 0..MAX_DAMPINGS {
             let damped = h + Matrix6::from_diagonal_element(self.lambda * size);
             let step = damped.cholesky().map(|c| -c.solve(&b));
             let step = step.filter(|step| step.iter().all(|v| v.is_finite()));
@@ -155,7 +157,7 @@ impl State {
                 let pose = self.pose * about(&self.center.coords, &se3::exp(&step));
                 if pairs.cost(&pose) < self.sums.cost {
                     self.pose = renormalized(pose);
-                    self.lambda = (self.lambda / LAMBDA_FACTOR).max(LEAST_LAMBDA);
+                    self.lambda = (self.lambda / LAMBDA_FACTOR).max(MIN_LAMBDA);
                     return Some(step);
                 }
                 if attempt == 0 && is_small(&step, options, 1.0) {
@@ -168,7 +170,7 @@ impl State {
     }
 }
 
-/// Middle of a cloud in whole metres, or its origin if that is near.
+/// Centroid of a cloud in whole metres, or its origin if that is near.
 fn center_of(cloud: &PreparedCloud) -> Point3<f64> {
     let points_m = cloud.points_m();
     let sum: Vector3<f64> = points_m.iter().map(|p| p.coords).sum();
@@ -179,7 +181,7 @@ fn center_of(cloud: &PreparedCloud) -> Point3<f64> {
     }
 }
 
-/// A motion about the origin as the same motion about another point.
+/// Expresses a motion about the origin as one about another point.
 fn about(center: &Vector3<f64>, motion: &Isometry3<f64>) -> Isometry3<f64> {
     if *center == Vector3::zeros() {
         return *motion;
@@ -189,6 +191,7 @@ fn about(center: &Vector3<f64>, motion: &Isometry3<f64>) -> Isometry3<f64> {
     motion
 }
 
+/// Tests whether a step is below a fraction of the tolerances.
 fn is_small(step: &Vector6<f64>, options: &RegisterOptions, share: f64) -> bool {
     step.fixed_rows::<3>(0).norm() <= share * options.translation_tolerance_m
         && step.fixed_rows::<3>(3).norm() <= share * options.rotation_tolerance_rad

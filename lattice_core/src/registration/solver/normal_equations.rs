@@ -1,36 +1,37 @@
-//! The normal equations of pairs of points.
+//! Normal equations of correspondences.
 //!
-//! All is in the axes of the target: q = T x, z = R (x - c), r = y - q, m = R n_s, where c is the centre of the source.
-//! A step (rho, phi) turns r into r - rho - phi x z, so J = [-I, [z]x]; with axes turned by R^T it is the right
-//! perturbation about the centre, T C Exp(delta) C^-1, where C moves by c.
+//! All vectors are along the axes of the target: q = T x, z = R (x - c), r = y - q, m = R n_s, where c is the centre
+//! of the source. A step (rho, phi) changes r to r - rho - phi x z, so J = [-I, [z]x]. With the axes rotated by R^T,
+//! this is the right perturbation about the centre, T C Exp(delta) C^-1, where C translates by c.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
-use super::pair::Pair;
+use super::correspondence::Correspondence;
 use super::robust_kernel::Kernel;
 
+/// Accumulated normal equations.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sums {
+pub(super) struct NormalEquations {
     pub cost: f64,
-    /// Weights under the kernel, and times |r|^2.
+    /// Sum of the kernel weights, and of these times |r|^2.
     pub weight: f64,
     pub squared_m2: f64,
-    /// Source points with a pair that counts.
+    /// Number of source points with a correspondence of positive weight.
     pub inliers: usize,
     pub pairs: usize,
-    /// Upper triangle by rows of the rank-one parts.
+    /// Upper triangle, by rows, of the rank-one terms.
     h: [f64; 21],
     b: [f64; 6],
     /// Sums of w base, w base z and w base z z^T (upper triangle).
     base: [f64; 10],
 }
 
-impl Sums {
-    /// Adds the linear system of a pair. `turn` is the flatness of the source's covariance if the gradient
-    /// is to follow it, 0 if not.
+impl NormalEquations {
+    /// Adds a correspondence. `turn` is the flatness of the source covariance if the gradient includes its rotation,
+    /// else 0.
     #[inline(always)]
-    pub fn add(&mut self, pair: &Pair, weight: f64, kernel: Kernel, turn: f64) {
-        let g = pair.pull();
+    pub fn add(&mut self, pair: &Correspondence, weight: f64, kernel: Kernel, turn: f64) {
+        let g = pair.gradient();
         let (cost, slope) = kernel.apply(weight, pair.r.dot(&g));
         self.cost += cost;
         self.weight += slope;
@@ -83,8 +84,8 @@ impl Sums {
         }
     }
 
-    /// Sums of two sets of pairs; the order of additions is the order of the calls.
-    pub fn merge(mut self, other: &Sums) -> Sums {
+    /// Adds other normal equations; the order of the additions is that of the calls.
+    pub fn merge(mut self, other: &NormalEquations) -> NormalEquations {
         self.cost += other.cost;
         self.weight += other.weight;
         self.squared_m2 += other.squared_m2;
@@ -143,7 +144,7 @@ mod tests {
 
     use super::*;
     use crate::pose::se3;
-    use crate::registration::solver::pair::Metric;
+    use crate::registration::solver::correspondence::Metric;
 
     /// A pair as its points and normals in their own frames.
     #[derive(Clone, Debug)]
@@ -161,10 +162,10 @@ mod tests {
             Metric::Planes { target, source }
         }
 
-        fn pair(&self, pose: &Isometry3<f64>) -> Pair {
+        fn pair(&self, pose: &Isometry3<f64>) -> Correspondence {
             let (q, m) = (pose * self.x, pose.rotation * self.normals[0]);
             let p = pose.translation.vector;
-            Pair::new(self.metric(), &p, (&q, &m), (&self.y, &self.normals[1]))
+            Correspondence::new(self.metric(), &p, (&q, &m), (&self.y, &self.normals[1]))
         }
 
         /// (C_t + R C_s R^T)^-1 as it is written.
@@ -221,7 +222,7 @@ mod tests {
             prop_assert!((pair.squared() - expected).abs() < 1e-9 * (1.0 + expected));
             let inverse = raw.inverse(&raw.pose);
             let pull = inverse * pair.r;
-            prop_assert!((pair.pull() - pull).norm() < 1e-9 * (1.0 + pull.norm()));
+            prop_assert!((pair.gradient() - pull).norm() < 1e-9 * (1.0 + pull.norm()));
             let determinant = 1.0 / inverse.determinant();
             prop_assert!((pair.information.determinant / determinant - 1.0).abs() < 1e-9);
         }
@@ -229,7 +230,7 @@ mod tests {
         #[test]
         fn the_gradient_is_the_numeric_one(raw in raw(), weight in 0.1f64..2.0) {
             for kernel in kernels() {
-                let mut sums = Sums::default();
+                let mut sums = NormalEquations::default();
                 sums.add(&raw.pair(&raw.pose), weight, kernel, raw.flat[1]);
                 let (_, half) = sums.system(&raw.pose);
                 let cost = |axis: usize, by: f64| {
@@ -255,7 +256,7 @@ mod tests {
         #[test]
         fn the_hessian_is_jacobian_times_information_times_jacobian(raw in raw(), weight in 0.1f64..2.0) {
             let kernel = Kernel::Cauchy { a2: 9.0 };
-            let mut sums = Sums::default();
+            let mut sums = NormalEquations::default();
             sums.add(&raw.pair(&raw.pose), weight, kernel, 0.0);
             let (h, b) = sums.system(&raw.pose);
             let rotation = raw.pose.rotation.to_rotation_matrix().into_inner();

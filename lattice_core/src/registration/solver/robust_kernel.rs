@@ -1,20 +1,20 @@
-//! Robust kernels: the cost of a distance, and how far a pair still pulls.
+//! Robust kernels: cost of a squared distance and its derivative.
 
-/// Cost of a pair with weight w and squared Mahalanobis distance d2.
+/// Cost of a correspondence with weight w and squared Mahalanobis distance d2.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Kernel {
     /// w d2
     None,
     /// w a2 ln(1 + d2 / a2)
     Cauchy { a2: f64 },
-    /// a2 ln(1 + w d2 / a2), as the seed prints it
+    /// a2 ln(1 + w d2 / a2), as printed in the seed paper
     CauchyAround { a2: f64 },
     /// w a2 / 2 ln(1 + d2^2 / a2), a Cauchy loss on the residual d2
     CauchyOfSquare { a2: f64 },
 }
 
 impl Kernel {
-    /// The cost and its derivative by d2.
+    /// Cost and its derivative by d2.
     #[inline(always)]
     pub fn apply(self, weight: f64, squared: f64) -> (f64, f64) {
         match self {

@@ -1,4 +1,4 @@
-//! Changes of a list since they were asked for last.
+//! Changes of a list since the last query for them.
 
 use super::VoxelList;
 use crate::lattice::{BlockKey, MortonKey};
@@ -9,19 +9,19 @@ use crate::voxels::store::shard::Life;
 pub struct Changes {
     /// Voxels that are new or have more points.
     pub changed: Vec<MortonKey>,
-    /// Voxels of the earlier state that are no longer there.
+    /// Voxels of the earlier state that were removed.
     pub removed: Vec<MortonKey>,
 }
 
 impl VoxelList {
-    /// Number of the state: every call that may change voxels makes the next one.
+    /// State counter: every call that may change voxels increments it.
     pub fn sequence(&self) -> u32 {
         self.sequence
     }
 
-    /// Changes since the call before (since the beginning for the first).
+    /// Changes since the previous call (since the start for the first).
     ///
-    /// The memory for this is bounded by the number of voxels that were there at that call.
+    /// The memory is bounded by the number of voxels at that call.
     pub fn take_changes(&mut self) -> Changes {
         let changes = self.changes_since(self.taken);
         self.taken = self.sequence;
@@ -47,7 +47,7 @@ impl VoxelList {
         Changes { changed, removed }
     }
 
-    /// Makes the next state and gives its number.
+    /// Increments the state and returns its number.
     pub(crate) fn advance(&mut self) -> u32 {
         if self.sequence == u32::MAX {
             self.renumber();
@@ -56,7 +56,7 @@ impl VoxelList {
         self.sequence
     }
 
-    /// Starts counting states anew; changes that were taken stay taken.
+    /// Restarts the state counter; changes already taken stay taken.
     fn renumber(&mut self) {
         let taken = self.taken;
         let new = |state: u32| u32::from(state > taken);
@@ -73,8 +73,7 @@ impl VoxelList {
         (self.taken, self.sequence) = (0, 1);
     }
 
-    /// Bounds the memory for removed voxels: of more than `max_voxels` only those are remembered
-    /// that were there at the last `take_changes`.
+    /// Bounds the memory for removed voxels: above `max_voxels`, only those of the last `take_changes` are kept.
     pub(crate) fn bound_removed(&mut self) {
         let remembered: usize = self.shards.iter().map(|shard| shard.removed.len()).sum();
         if remembered > self.max_voxels {

@@ -1,4 +1,4 @@
-//! Faces of the occupied cells that can be seen from outside.
+//! Faces of occupied cells visible from outside.
 
 use rayon::prelude::*;
 
@@ -6,9 +6,9 @@ use super::VoxelList;
 use crate::lattice::MortonKey;
 
 impl VoxelList {
-    /// The faces of a cell behind which no cell is occupied, as indices of `VoronoiCell::faces`.
+    /// Faces of a cell without an occupied cell behind them, as indices of `VoronoiCell::faces`.
     ///
-    /// The cell itself need not be occupied. Beyond the range of keys nothing is occupied.
+    /// The cell itself need not be occupied. Cells out of the range of keys are unoccupied.
     fn exposed_faces_of(&self, key: MortonKey) -> impl Iterator<Item = usize> + '_ {
         let [x, y, z] = key.unpack();
         let faces = self.lattice.face_neighbors().iter().enumerate();

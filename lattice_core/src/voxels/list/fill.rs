@@ -1,4 +1,4 @@
-//! Filling a list with voxels that were read.
+//! Filling a list with voxels from a file.
 
 use crate::lattice::{BlockKey, MortonKey};
 use crate::voxels::store::fixed_point::{offsets_in, reach};
@@ -7,8 +7,8 @@ use crate::voxels::store::shard::{SHARDS, shard_of};
 use crate::voxels::{LabelCount, Voxel, VoxelList, VoxelStore};
 
 impl VoxelList {
-    /// Adds cells of which none is in the list, with those further columns that the list keeps, until
-    /// it is full. Keys of one block should come together.
+    /// Adds new cells, with the optional columns that the list keeps, until it is full. Keys of one block should be
+    /// consecutive.
     pub(crate) fn fill(
         &mut self,
         cells: impl Iterator<Item = (MortonKey, Voxel)>,
@@ -37,8 +37,9 @@ impl VoxelList {
         }
     }
 
-    /// Puts a voxel with its labels in place of what a cell holds, a voxel without points to take it out;
-    /// false, changing nothing, if the cell is new and the list is full. The statistics stay as they are.
+    /// Replaces a voxel and its labels; a voxel without points removes it.
+    ///
+    /// Returns false, without a change, if the cell is new and the list is full. The statistics stay.
     pub fn put(&mut self, key: MortonKey, voxel: &Voxel, labels: &[LabelCount]) -> bool {
         if voxel.count == 0 {
             self.remove(key);

@@ -1,4 +1,4 @@
-//! Inserting clouds into a list, on one thread or many.
+//! Inserting clouds into a list, on one or many threads.
 
 use nalgebra::{Translation3, Vector3};
 use rayon::prelude::*;
@@ -12,34 +12,34 @@ use crate::voxels::store::payload_columns::{Details, LabelCount, Stamps};
 use crate::voxels::store::point_gather::{Gather, Partial};
 use crate::voxels::store::shard::{BATCH, SHARDS, Shard, shard_of};
 
-/// Fewer points are not worth gathering.
+/// Minimum number of points for gathering.
 const FEW: usize = 1 << 12;
-/// Fewest points that are worth a thread.
+/// Minimum number of points per thread.
 const PART: usize = 1 << 13;
-/// Points between two merges; bounds the memory for what is not yet merged.
+/// Points between two merges; bounds the memory of unmerged points.
 const WAVE: usize = 1 << 18;
 
-/// Points of a cloud by outcome; the outcomes add up to `points`.
+/// Points of a cloud by outcome; the outcomes sum to `points`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct InsertReport {
-    /// Points in the cloud.
+    /// Number of points in the cloud.
     pub points: u64,
-    /// Points now in the list.
+    /// Points inserted.
     pub inserted: u64,
     /// Points with a coordinate that is NaN or infinite.
     pub not_finite: u64,
     /// Points more than 2^20 cells from the datum.
     pub out_of_range: u64,
-    /// Points whose cell would have been new when the list was full.
+    /// Points refused because their cell was new and the list full.
     pub list_full: u64,
-    /// Voxels that were not in the list before.
+    /// New voxels.
     pub new_voxels: u64,
-    /// Voxels that went to make room, see [`crate::voxels::WhenFull`].
+    /// Voxels evicted, see [`crate::voxels::WhenFull`].
     pub forgotten_voxels: u64,
 }
 
 impl InsertReport {
-    /// Counts the points of a batch that have no cell, by reason.
+    /// Counts the points of a batch without a cell, by reason.
     #[inline]
     pub(crate) fn count_rejects<T: Coordinate>(
         &mut self,
@@ -72,7 +72,7 @@ impl InsertReport {
         }
     }
 
-    /// Adds what became of other points.
+    /// Adds the outcomes of other points.
     pub(crate) fn add(&mut self, other: &InsertReport) {
         self.points += other.points;
         self.inserted += other.inserted;
@@ -87,16 +87,16 @@ impl InsertReport {
 /// Stamps and labels of points.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PointColumns<'a> {
-    /// Stamp of the points that have none of their own, ns.
+    /// Stamp of points without one of their own, ns.
     pub stamp_ns: i64,
     /// Stamps of the first points, ns.
     pub stamps_ns: &'a [i64],
-    /// Labels of the first points; those beyond have none.
+    /// Labels of the first points; others have none.
     pub labels: &'a [u16],
 }
 
 impl PointColumns<'_> {
-    /// The columns of the points from `place` on.
+    /// Columns of the points from `place` on.
     fn after(self, place: usize) -> Self {
         PointColumns {
             stamps_ns: self.stamps_ns.get(place..).unwrap_or_default(),
@@ -105,7 +105,7 @@ impl PointColumns<'_> {
         }
     }
 
-    /// Contribution of a point to the further columns.
+    /// Contribution of a point to the optional columns.
     fn details(&self, place: usize) -> Details {
         let stamp_ns = self.stamps_ns.get(place).copied().unwrap_or(self.stamp_ns);
         let label = self.labels.get(place).copied();
@@ -122,7 +122,7 @@ impl PointColumns<'_> {
     }
 }
 
-/// The points of a chunk, quantized and gathered by cell, the cells by shard.
+/// Points of a chunk, quantized and gathered by cell, the cells by shard.
 struct Chunk {
     gather: Gather,
     by_shard: Vec<Vec<Partial>>,
@@ -133,18 +133,18 @@ struct Chunk {
 impl VoxelList {
     /// Adds every finite point in range to its cell, on the threads of the current rayon pool.
     ///
-    /// In a full list, points in known cells still count; new cells are decided on in
-    /// the order of the points. The outcome does not depend on the number of threads.
+    /// In a full list, points in existing cells still count; new cells are decided in the order of the points. The
+    /// result does not depend on the number of threads.
     pub fn insert(&mut self, cloud: &Cloud) -> InsertReport {
         self.insert_labelled(cloud, &[])
     }
 
-    /// [`VoxelList::insert`] with a label for each point; points beyond the labels have none.
+    /// [`VoxelList::insert`] with a label per point; points beyond the labels have none.
     pub fn insert_labelled(&mut self, cloud: &Cloud, labels: &[u16]) -> InsertReport {
         self.insert_offsets(cloud.stamp_ns, cloud.datum_m, &cloud.offsets_m, labels)
     }
 
-    /// [`VoxelList::insert_labelled`] for the parts of a [`Cloud`], which others may hold.
+    /// [`VoxelList::insert_labelled`] for the parts of a borrowed [`Cloud`].
     pub fn insert_offsets(
         &mut self,
         stamp_ns: i64,
@@ -160,7 +160,7 @@ impl VoxelList {
         self.insert_points(datum_m, offsets_m, columns)
     }
 
-    /// Adds points `datum_m + offset`, as [`VoxelList::insert`] does, in the precision of their coordinates.
+    /// Adds points `datum_m + offset`, as [`VoxelList::insert`], in the precision of their coordinates.
     pub fn insert_points<T: Coordinate>(
         &mut self,
         datum_m: Vector3<f64>,
@@ -186,7 +186,7 @@ impl VoxelList {
                 self.insert_singly(&quantizer, wave, of_wave, now, &mut report);
                 continue;
             }
-            // A part for each thread: which points are in which does not matter to the sums.
+            // One part per thread; the partition does not affect the sums.
             let parts = (wave.len() / PART).clamp(1, rayon::current_num_threads());
             chunks.resize_with(parts.max(chunks.len()), Chunk::new);
             let parts = chunks.get_mut(..parts).unwrap_or_default();
@@ -202,7 +202,7 @@ impl VoxelList {
         report
     }
 
-    /// Point by point: knows of each point whether it found room.
+    /// Inserts point by point, with the outcome of each.
     fn insert_singly<T: Coordinate>(
         &mut self,
         quantizer: &BatchQuantizer,
@@ -245,7 +245,7 @@ impl VoxelList {
         });
     }
 
-    /// Adds the quantization errors of a block of which some points were refused.
+    /// Adds the quantization errors of a block with refused points.
     #[cold]
     fn add_sums_of_known<T: Coordinate>(
         &mut self,
@@ -261,8 +261,8 @@ impl VoxelList {
         }
     }
 
-    /// On the threads of the current pool: first by parts of the points, then by shards. There must be
-    /// room for a voxel for each point.
+    /// Inserts on the threads of the current pool: first by parts of the points, then by shards. Requires free space
+    /// for one voxel per point.
     fn insert_wave<T: Coordinate>(
         &mut self,
         quantizer: &BatchQuantizer,

@@ -1,4 +1,4 @@
-//! Voxel list: construction, look-up, invariants; each change of a list has a file of its own.
+//! Voxel list: construction, lookup, invariants; each kind of change has its own file.
 
 mod changes;
 mod exposed_faces;
@@ -27,7 +27,7 @@ pub use insert::{InsertReport, PointColumns};
 pub use remove::NoStamps;
 pub use when_full::WhenFull;
 
-/// The datum is not finite or too many cells from the origin of the map frame.
+/// Datum that is not finite or out of range.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
 #[error("datum ({x}, {y}, {z}) m is not finite or more than 2^48 cells from the map origin")]
 #[expect(missing_docs, reason = "the messages name the fields")]
@@ -37,10 +37,10 @@ pub struct DatumError {
     pub z: f64,
 }
 
-/// Occupied voxels of a lattice whose indices count from a datum in the map frame.
+/// Occupied voxel list of a lattice whose indices count from a datum in the map frame.
 ///
-/// The datum is a lattice point of the map frame, so that lists with one lattice and datum speak of
-/// the same cells, and points far from the map origin keep all their digits.
+/// The datum is a lattice point of the map frame. Lists with one lattice and datum have the same cells, and points
+/// far from the map origin keep their precision.
 #[derive(Clone)]
 pub struct VoxelList {
     pub(super) lattice: Lattice,
@@ -51,15 +51,15 @@ pub struct VoxelList {
     pub(super) payload: Payload,
     pub(super) shards: Vec<Shard>,
     pub(super) sums: DistortionSums,
-    /// Number of the state.
+    /// State counter.
     pub(super) sequence: u32,
     /// State at the last `take_changes`.
     pub(super) taken: u32,
 }
 
 impl VoxelList {
-    /// An empty list of at most `max_voxels`, with the datum at the lattice point nearest to
-    /// `datum_near_m` (map frame, metres).
+    /// Creates an empty list of at most `max_voxels`, with the datum at the lattice point nearest to `datum_near_m`
+    /// (map frame, metres).
     pub fn new(
         lattice: Lattice,
         datum_near_m: Vector3<f64>,
@@ -90,7 +90,7 @@ impl VoxelList {
         }
     }
 
-    /// The same list with further columns, empty.
+    /// Sets the optional columns; the list becomes empty.
     pub fn with_payload(self, payload: Payload) -> VoxelList {
         let mut list = VoxelList::at_datum(self.lattice, self.datum_index, self.max_voxels);
         list.payload = payload;
@@ -99,15 +99,15 @@ impl VoxelList {
         list
     }
 
-    /// Further columns that are kept.
+    /// Optional columns of the list.
     pub fn payload(&self) -> Payload {
         self.payload
     }
 
-    /// Number of voxels of a payload that surely fit into `max_bytes`, to bound a list by.
+    /// Number of voxels of a payload that fit into `max_bytes` in the worst case, to bound a list.
     ///
-    /// Each may be alone in its block and may be remembered as removed: some 350 bytes, where on
-    /// surfaces a voxel takes 46. Of labels a handful a voxel is assumed.
+    /// A voxel may be alone in its block and may be kept as removed: 350 bytes, compared with 46 on surfaces. A
+    /// handful of labels per voxel is assumed.
     pub fn voxels_within(max_bytes: usize, payload: Payload) -> usize {
         let columns = |kept: bool, bytes: usize| if kept { bytes } else { 0 };
         let columns = columns(payload.stamps, 16) + columns(payload.labels, 24 + 8 * 8);
@@ -127,7 +127,7 @@ impl VoxelList {
         &self.lattice
     }
 
-    /// The lattice point that keys count from, map frame, metres.
+    /// Datum: lattice point that keys count from, map frame, metres.
     pub fn datum_m(&self) -> Vector3<f64> {
         self.datum_m
     }
@@ -137,7 +137,7 @@ impl VoxelList {
         self.datum_index
     }
 
-    /// Most voxels that the list takes.
+    /// Maximum number of voxels.
     pub fn max_voxels(&self) -> usize {
         self.max_voxels
     }
@@ -147,12 +147,12 @@ impl VoxelList {
         self.shards.iter().map(Shard::len).sum()
     }
 
-    /// True if no voxel is occupied.
+    /// Tests whether there is no voxel.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The voxel of a cell, if occupied.
+    /// Voxel of a cell, if occupied.
     pub fn get(&self, key: MortonKey) -> Option<Voxel> {
         let code = BlockKey::from(key);
         let shard = self.shard(code)?;
@@ -160,7 +160,7 @@ impl VoxelList {
         Some(shard.voxel(code, entry))
     }
 
-    /// True if the cell is occupied.
+    /// Tests whether a cell is occupied.
     pub fn contains(&self, key: MortonKey) -> bool {
         let code = BlockKey::from(key);
         self.shard(code)
@@ -174,7 +174,7 @@ impl VoxelList {
         Some(shard.columns.get(number as usize))
     }
 
-    /// Stamps of the first and last point in a cell; none if not kept.
+    /// Stamps of the first and last point in a cell; `None` if not kept.
     pub fn stamps(&self, key: MortonKey) -> Option<Stamps> {
         self.details(key)?.stamps
     }
@@ -186,7 +186,7 @@ impl VoxelList {
             .unwrap_or_default()
     }
 
-    /// The most frequent label of a cell, the smallest of equals.
+    /// Most frequent label of a cell, the smallest of equals.
     pub fn label(&self, key: MortonKey) -> Option<LabelCount> {
         let labels = self.labels(key).into_iter();
         labels.min_by_key(|counted| (std::cmp::Reverse(counted.count), counted.label))
@@ -209,7 +209,7 @@ impl VoxelList {
         voxels
     }
 
-    /// All voxels in Morton order, with the further columns.
+    /// All voxels in Morton order, with the optional columns.
     pub(super) fn sorted_columns(&self) -> (Vec<MortonKey>, Vec<Voxel>, Columns) {
         let mut columns = Columns::new(self.payload);
         if self.payload.is_plain() {
@@ -232,12 +232,12 @@ impl VoxelList {
         (keys, voxels, columns)
     }
 
-    /// Quantization error over all points that were inserted, also of voxels removed since.
+    /// Quantization error over all points ever inserted, including those of removed voxels.
     pub fn distortion(&self) -> Distortion {
         self.sums.summary(&self.lattice)
     }
 
-    /// Empties the list and its statistics; keeps lattice, datum and bound.
+    /// Clears the list and its statistics; keeps lattice, datum and limit.
     pub fn clear(&mut self) {
         let now = self.advance();
         self.shards.iter_mut().for_each(|shard| shard.clear(now));
@@ -245,12 +245,12 @@ impl VoxelList {
         self.bound_removed();
     }
 
-    /// Checks everything that must hold between calls; says what does not.
+    /// Validates all invariants; returns the first violation.
     pub fn validate(&self) -> Result<(), String> {
         let reach = reach(&self.lattice);
         if self.len() > self.max_voxels {
             return Err(format!(
-                "{} voxels, but at most {} allowed",
+                "{} voxels, above the limit of {}",
                 self.len(),
                 self.max_voxels
             ));

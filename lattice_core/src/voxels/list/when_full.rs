@@ -1,4 +1,4 @@
-//! Full lists: refuse new voxels or forget the oldest.
+//! Full lists: refuse new voxels or evict the oldest.
 
 use super::VoxelList;
 use crate::lattice::BlockKey;
@@ -7,26 +7,25 @@ use crate::voxels::store::shard::Shard;
 /// Policy of a full list for points in new cells.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum WhenFull {
-    /// Refuses them; points in known cells still count.
+    /// Refuses them; points in existing cells still count.
     #[default]
     Refuse,
-    /// Forgets the voxels that no point has touched for longest until 7/8 of the limit are left.
+    /// Evicts the least recently changed voxels until 7/8 of the limit are left.
     ///
-    /// Points are taken in portions of at most 1/8 of the limit. Before a portion that may not fit,
-    /// the voxels go in the order of the state in which they last changed, those of one state in the
-    /// order of their cells: the same on any number of threads. No point is refused, except by a
-    /// list of at most 0 voxels.
+    /// Points are inserted in portions of at most 1/8 of the limit. Before a portion that may not fit, voxels are
+    /// evicted in the order of the state of their last change, then of their cells: the same on any number of
+    /// threads. No point is refused, except by a list of at most 0 voxels.
     ForgetOldest,
 }
 
 impl VoxelList {
-    /// The same list with another policy for [`VoxelList::insert`].
+    /// Sets the policy of [`VoxelList::insert`].
     pub fn with_when_full(mut self, when_full: WhenFull) -> VoxelList {
         self.when_full = when_full;
         self
     }
 
-    /// Goes on with another bound and policy; voxels beyond the bound stay until room is made.
+    /// Sets another limit and policy; voxels above the limit stay until the next eviction.
     pub fn set_bound(&mut self, max_voxels: usize, when_full: WhenFull) {
         (self.max_voxels, self.when_full) = (max_voxels, when_full);
     }
@@ -36,12 +35,12 @@ impl VoxelList {
         self.when_full
     }
 
-    /// Room that is made at once.
+    /// Number of voxels evicted at once.
     fn portion(&self) -> usize {
         self.max_voxels.div_ceil(8).max(1)
     }
 
-    /// Points to insert at once.
+    /// Number of points inserted at once.
     pub(crate) fn wave_points(&self, wave: usize) -> usize {
         match self.when_full {
             WhenFull::Refuse => wave,
@@ -49,7 +48,7 @@ impl VoxelList {
         }
     }
 
-    /// Forgets voxels, if it is the policy and `points` may not fit; gives their number.
+    /// Evicts voxels, if that is the policy and `points` may not fit; returns their number.
     pub(crate) fn make_room(&mut self, points: usize, now: u32) -> usize {
         let len = self.len();
         if self.when_full == WhenFull::Refuse || len.saturating_add(points) <= self.max_voxels {

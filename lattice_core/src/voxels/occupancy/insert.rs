@@ -8,9 +8,9 @@ use crate::cloud::Cloud;
 use crate::lattice::{BatchQuantizer, BlockKey};
 use crate::voxels::InsertReport;
 
-/// Fewest points that are worth a thread.
+/// Minimum number of points per thread.
 const PART: usize = 1 << 13;
-/// Points between two merges into the list; bounds the memory for what is not yet merged.
+/// Points between two merges into the list; bounds the memory of unmerged points.
 const WAVE: usize = 1 << 18;
 
 impl OccupancyList {
@@ -70,8 +70,8 @@ impl OccupancyList {
         self.recent = recent;
     }
 
-    /// Inserts waves on the threads of the current pool: while the cells of one are set, the next
-    /// is quantized. There must be room for a block for each point.
+    /// Inserts in waves on the threads of the current pool: while the cells of one are set, the next is quantized.
+    /// Requires free space for one block per point.
     fn insert_waves(
         &mut self,
         quantizer: &BatchQuantizer,
@@ -108,7 +108,7 @@ impl OccupancyList {
     }
 }
 
-/// Quantizes points and leaves out cells that it has just seen.
+/// Quantizes points and drops recently seen cells.
 struct Sifter {
     recent: Recent,
     kept: Vec<BlockKey>,

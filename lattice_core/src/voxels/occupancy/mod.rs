@@ -1,4 +1,4 @@
-//! The store that keeps one bit for a voxel.
+//! Occupancy list: a store of one bit per voxel.
 
 use std::fmt;
 
@@ -14,9 +14,9 @@ use super::{DatumError, InsertReport, VoxelStore};
 use crate::cloud::Cloud;
 use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
 
-/// Memory for a block, growth of the vectors and of the table included.
+/// Maximum memory per block, including the growth of the vectors and of the table.
 const BLOCK_BYTES: usize = Table::<Block>::ROW_BYTES;
-/// Most memory besides that of blocks.
+/// Maximum memory besides blocks.
 const FIRST_BYTES: usize = Table::<Block>::FIRST_BYTES + Recent::BYTES;
 
 #[derive(Clone)]
@@ -32,10 +32,10 @@ impl Row for Block {
     }
 }
 
-/// Occupied voxels without payload: blocks of 8 x 8 x 8 indices with one bit for each cell.
+/// Occupied voxels without payload: blocks of 8 x 8 x 8 indices with one bit per cell.
 ///
-/// The fastest store and the smallest, 2 to 4 bytes a voxel on surfaces. When `max_bytes` is
-/// reached, points in new blocks are refused and counted; blocks that exist go on to take points.
+/// The fastest and smallest store, 2 to 4 bytes per voxel on surfaces. When `max_bytes` is reached, points in new
+/// blocks are refused and counted; existing blocks still accept points.
 #[derive(Clone)]
 pub struct OccupancyList {
     lattice: Lattice,
@@ -48,8 +48,8 @@ pub struct OccupancyList {
 }
 
 impl OccupancyList {
-    /// An empty list that holds at most `max_bytes`, with the datum at the lattice point nearest to
-    /// `datum_near_m` (map frame, metres).
+    /// Creates an empty list of at most `max_bytes`, with the datum at the lattice point nearest to `datum_near_m`
+    /// (map frame, metres).
     pub fn new(
         lattice: Lattice,
         datum_near_m: Vector3<f64>,
@@ -61,7 +61,7 @@ impl OccupancyList {
         Ok(Self::at_datum(lattice, datum_index, max_bytes))
     }
 
-    /// An empty list that holds at most `max_bytes`, with its datum at a lattice point.
+    /// Creates an empty list of at most `max_bytes`, with its datum at a lattice point.
     pub fn at_datum(lattice: Lattice, datum_index: [i64; 3], max_bytes: usize) -> OccupancyList {
         OccupancyList {
             datum_m: lattice.center_wide(datum_index),
@@ -74,8 +74,7 @@ impl OccupancyList {
         }
     }
 
-    /// The cells with these keys, so far as they fit into `max_bytes`; fast for sorted keys, of which
-    /// a whole block at a time is added.
+    /// Creates a list of the cells that fit into `max_bytes`; fast for sorted keys, which are added by block.
     pub fn from_keys(
         lattice: Lattice,
         datum_index: [i64; 3],
@@ -96,7 +95,7 @@ impl OccupancyList {
         list
     }
 
-    /// Adds the cells of a block, by the bits that their keys share; does nothing if the list is full.
+    /// Adds the cells of a block, given by the bits of their keys; no effect if the list is full.
     fn add_block(&mut self, morton: u64, leaf: &BlockMask) {
         let Some(first) = morton.checked_mul(512).and_then(MortonKey::from_raw) else {
             return;
@@ -116,19 +115,19 @@ impl OccupancyList {
         }
     }
 
-    /// Most voxels that a list of `max_bytes` can hold, if all their blocks are full.
+    /// Maximum number of voxels of a list of `max_bytes`, if all blocks are full.
     pub fn max_voxels_within(max_bytes: usize) -> usize {
         (max_bytes.saturating_sub(FIRST_BYTES) / BLOCK_BYTES).saturating_mul(BlockKey::BLOCK_CELLS)
     }
 
-    /// Most bytes that the list takes.
+    /// Memory limit, bytes.
     pub fn max_bytes(&self) -> usize {
         self.max_blocks
             .saturating_mul(BLOCK_BYTES)
             .saturating_add(FIRST_BYTES)
     }
 
-    /// Makes a cell occupied; false if the list is full.
+    /// Marks a cell as occupied; false if the list is full.
     pub fn add(&mut self, key: MortonKey) -> bool {
         self.set(BlockKey::from(key), &mut Last::default())
     }
@@ -166,7 +165,7 @@ impl OccupancyList {
         true
     }
 
-    /// Checks everything that must hold between calls; says what does not.
+    /// Validates all invariants; returns the first violation.
     pub fn validate(&self) -> Result<(), String> {
         self.blocks.validate()?;
         let bits = |block: &Block| {
@@ -200,7 +199,7 @@ impl OccupancyList {
     }
 }
 
-/// The block that was found before.
+/// Block of the last lookup.
 #[derive(Clone, Copy)]
 struct Last {
     block: u64,
@@ -247,7 +246,7 @@ impl VoxelStore for OccupancyList {
         block_mask::sorted_keys(blocks.map(|block| (block.code, &block.leaf)), self.len)
     }
 
-    /// The outcome does not depend on the number of threads of the current rayon pool.
+    /// The result does not depend on the number of threads of the current rayon pool.
     fn insert(&mut self, cloud: &Cloud) -> InsertReport {
         self.insert_cloud(cloud)
     }

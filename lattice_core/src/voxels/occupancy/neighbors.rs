@@ -1,14 +1,15 @@
-//! A pass over all voxels that counts their occupied neighbours.
+//! Counting the occupied neighbours of all voxels.
 
 use super::OccupancyList;
 use crate::lattice::{BlockKey, LatticeIndex};
 use crate::voxels::store::block_mask::{BlockMask, places};
 
-/// Blocks around a block, itself included.
+/// Number of blocks around a block, itself included.
 const AROUND: usize = 27;
 
-/// Places of the neighbours of a block's cells in the blocks around it: for each place of the block as
-/// many as there are differences, as block of `AROUND` * 512 + place.
+/// Positions of the neighbours of a block's cells in the surrounding blocks, as block of `AROUND` * 512 + position.
+///
+/// One entry per position of the block and index difference.
 fn targets(stencil: &[LatticeIndex]) -> Vec<u16> {
     let targets = (0..BlockKey::BLOCK_CELLS as i32).flat_map(|place| {
         stencil.iter().map(move |d| {
@@ -26,11 +27,11 @@ fn targets(stencil: &[LatticeIndex]) -> Vec<u16> {
 }
 
 impl OccupancyList {
-    /// Visits every voxel with the number of its neighbours that are occupied; the order is that of the
-    /// memory. Index differences of the neighbours, `stencil`, are at most 8.
+    /// Visits every voxel with the number of its occupied neighbours, in memory order; the index differences
+    /// `stencil` are at most 8.
     ///
-    /// A block and those around it are fetched once for all of their cells, so that a neighbour
-    /// costs a bit test, not a search.
+    /// A block and those around it are fetched once for all of their cells, so that a neighbour costs a bit test, not
+    /// a search.
     pub fn count_neighbors(&self, stencil: &[LatticeIndex], mut visit: impl FnMut(BlockKey, u32)) {
         debug_assert!(stencil.iter().flatten().all(|i| (-8..=8).contains(i)));
         let targets = targets(stencil);
@@ -53,7 +54,7 @@ impl OccupancyList {
         }
     }
 
-    /// The bits of the blocks around a block; none beyond the range of indices.
+    /// Bits of the blocks around a block; empty beyond the range of indices.
     fn fetch_around(&self, block: u64, around: &mut [u64; AROUND * 8]) {
         let Some(first) = BlockKey::from_raw(block << 9) else {
             return;

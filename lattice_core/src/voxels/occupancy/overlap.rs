@@ -7,8 +7,8 @@ use crate::lattice::BatchQuantizer;
 use crate::voxels::store::block_mask::{self, BlockMask};
 
 impl OccupancyList {
-    /// Number of points (metres) that `map_from_points` puts into occupied cells; fastest for points in an
-    /// order that keeps near ones together.
+    /// Number of points (metres) that `map_from_points` transforms into occupied cells; fastest for spatially sorted
+    /// points.
     pub fn overlap(&self, map_from_points: &Isometry3<f64>, points_m: &[[f32; 3]]) -> usize {
         const NOTHING: &BlockMask = &[0; 8];
         let datum_from_points = Translation3::from(-self.datum_m) * map_from_points;

@@ -1,13 +1,13 @@
-//! A filter for cells that have just been seen.
+//! Filter of recently seen cells.
 
 use crate::lattice::BlockKey;
 
 const SLOTS_LOG2: u32 = 12;
 const SLOTS: usize = 1 << SLOTS_LOG2;
 
-/// The last cells that were seen, as many as fit a direct-mapped table in the first-level cache.
+/// Recently seen cells in a direct-mapped table of the size of the first-level cache.
 ///
-/// Neighbouring beams and successive scans see the same cells: nine points in ten end here.
+/// Adjacent beams and successive scans see the same cells: nine points in ten end here.
 #[derive(Clone, Default)]
 pub(super) struct Recent {
     slots: Vec<BlockKey>,
@@ -27,8 +27,8 @@ impl Recent {
         (code.raw().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - SLOTS_LOG2)) as usize
     }
 
-    /// Copies the codes that were not seen, in order, to the front of `fresh`; gives their number.
-    /// [`BlockKey::NONE`] may be among them.
+    /// Copies the codes that were not seen, in order, to the front of `fresh`; returns their number. They may include
+    /// [`BlockKey::NONE`].
     #[inline]
     pub(super) fn sift<const N: usize>(
         &mut self,
@@ -48,7 +48,7 @@ impl Recent {
         count
     }
 
-    /// Makes a code unseen.
+    /// Removes a code.
     pub(super) fn forget(&mut self, code: BlockKey) {
         if let Some(slot) = self
             .slots
@@ -59,12 +59,12 @@ impl Recent {
         }
     }
 
-    /// Makes all codes unseen.
+    /// Removes all codes.
     pub(super) fn forget_all(&mut self) {
         self.slots.fill(BlockKey::NONE);
     }
 
-    /// Checks that all codes here are in the store.
+    /// Validates that all codes are in the store.
     pub(super) fn validate(&self, has: impl Fn(BlockKey) -> bool) -> Result<(), String> {
         let known = |code: &BlockKey| *code == BlockKey::NONE || has(*code);
         match self.slots.iter().find(|code| !known(code)) {
@@ -73,7 +73,7 @@ impl Recent {
                 code.unpack()
             )),
             None if self.slots.len() == SLOTS => Ok(()),
-            None => Err("the filter is gone".to_owned()),
+            None => Err("the filter of recent cells is missing".to_owned()),
         }
     }
 }

@@ -1,13 +1,13 @@
-//! One bit for each cell of a block, and the order of cells by their keys.
+//! Bit mask of a block, and the order of cells by their keys.
 
 use rayon::slice::ParallelSliceMut;
 
 use crate::lattice::{BlockKey, MortonKey};
 
-/// The cells of a block, one bit each, by their place.
+/// Cells of a block, one bit per position.
 pub(crate) type BlockMask = [u64; 8];
 
-/// The low nine bits of the key of each place in a block.
+/// Low nine bits of the key of each position in a block.
 static MORTON_OF_PLACE: [u16; BlockKey::BLOCK_CELLS] = {
     let mut table = [0; BlockKey::BLOCK_CELLS];
     let mut place = 0;
@@ -25,7 +25,7 @@ static MORTON_OF_PLACE: [u16; BlockKey::BLOCK_CELLS] = {
     table
 };
 
-/// The inverse: the place in a block of the low nine bits of a key.
+/// Inverse: position in a block of the low nine bits of a key.
 static PLACE_OF_MORTON: [u16; BlockKey::BLOCK_CELLS] = {
     let mut table = [0; BlockKey::BLOCK_CELLS];
     let mut place = 0;
@@ -43,21 +43,21 @@ pub(crate) fn set(leaf: &mut BlockMask, key: MortonKey) {
     leaf[place >> 6 & 7] |= 1 << (place & 63);
 }
 
-/// True if the cell at `place` of the block is occupied.
+/// Tests whether the cell at `place` of the block is occupied.
 #[inline(always)]
 pub(crate) fn is_set(leaf: &BlockMask, place: usize) -> bool {
     leaf.get(place >> 6)
         .is_some_and(|word| word >> (place & 63) & 1 != 0)
 }
 
-/// Positions of the bits that are set.
+/// Positions of the set bits.
 #[inline]
 pub(crate) fn places(leaf: &BlockMask) -> impl Iterator<Item = usize> + '_ {
     let words = leaf.iter().enumerate();
     words.flat_map(|(word, &left)| bits(left).map(move |bit| 64 * word + bit))
 }
 
-/// The numbers of the bits of a word that are set, below 64.
+/// Indices of the set bits of a word, below 64.
 #[inline(always)]
 pub(crate) fn bits(mut left: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {

@@ -1,4 +1,4 @@
-//! A table of voxels that is found block by block.
+//! Table of voxels, looked up by block.
 
 use super::block_mask::{self, BlockMask};
 use super::growth;
@@ -7,18 +7,18 @@ use super::shard::Entry;
 use crate::lattice::BlockKey;
 use crate::prefetch::prefetch;
 
-/// Voxels that a block has room for at first.
+/// Initial voxel capacity of a block.
 const FIRST_NUMBERS: usize = 8;
 
-/// The voxels of a block.
+/// Voxels of a block.
 #[derive(Clone)]
 struct Block {
     code: u64,
-    /// One bit for each cell, by its place.
+    /// One bit per cell, by position.
     leaf: BlockMask,
-    /// Voxels before each word of the leaf.
+    /// Number of voxels before each word of the mask.
     before: [u16; 8],
-    /// Numbers of the voxels, by place.
+    /// Indices of the voxels, by position.
     numbers: Vec<u32>,
 }
 
@@ -39,7 +39,7 @@ impl Block {
         }
     }
 
-    /// True if a place is taken, and its rank among the taken ones.
+    /// Occupancy of a position, and its rank among the occupied ones.
     #[inline(always)]
     fn rank(&self, place: usize) -> (bool, usize) {
         let (word, bit) = (place >> 6 & 7, place & 63);
@@ -84,23 +84,23 @@ impl Block {
     }
 }
 
-/// Voxels in the order of their arrival, found by their codes.
+/// Voxels in insertion order, looked up by their codes.
 ///
-/// A scan fills few blocks, over and over: they stay near the processor however large the map is,
-/// where a hash table over all cells would touch a far line of memory for each.
+/// A scan fills few blocks repeatedly: they stay in the cache for any size of the map. A hash table over all cells
+/// would access a distant cache line for each.
 pub(crate) struct CellTable {
     blocks: Table<Block>,
     rows: Vec<Entry>,
     /// Bytes of all `Block::numbers`.
     number_bytes: usize,
-    /// The block found before.
+    /// Block of the last lookup.
     last: (u64, u32),
 }
 
 impl Clone for CellTable {
     fn clone(&self) -> CellTable {
         let blocks = self.blocks.clone();
-        // Copies of vectors have no room to spare.
+        // Copies of vectors have no spare capacity.
         let capacities = blocks.rows().iter().map(|block| block.numbers.capacity());
         CellTable {
             number_bytes: capacities.sum::<usize>() * size_of::<u32>(),
@@ -112,11 +112,11 @@ impl Clone for CellTable {
 }
 
 impl CellTable {
-    /// Most bytes for a voxel: that of one alone in its block.
+    /// Maximum bytes per voxel: one alone in its block.
     pub(crate) const VOXEL_BYTES: usize = growth::most_bytes::<Entry>()
         + Table::<Block>::ROW_BYTES
         + FIRST_NUMBERS * size_of::<u32>();
-    /// Most bytes besides those of voxels.
+    /// Maximum bytes besides voxels.
     pub(crate) const FIRST_BYTES: usize =
         Table::<Block>::FIRST_BYTES + growth::FIRST * size_of::<Entry>();
 
@@ -129,7 +129,7 @@ impl CellTable {
         }
     }
 
-    /// Makes room for more voxels.
+    /// Reserves space for more voxels.
     pub(crate) fn reserve(&mut self, voxels: usize) {
         self.rows.reserve_exact(voxels);
     }
@@ -139,23 +139,23 @@ impl CellTable {
         self.rows.len()
     }
 
-    /// All voxels by number.
+    /// All voxels by index.
     pub(crate) fn rows(&self) -> &[Entry] {
         &self.rows
     }
 
-    /// All voxels by number. Their codes must stay.
+    /// All voxels by index. Their codes must not change.
     pub(crate) fn rows_mut(&mut self) -> &mut [Entry] {
         &mut self.rows
     }
 
-    /// The voxel of a number.
+    /// Voxel of an index.
     #[inline(always)]
     pub(crate) fn row_mut(&mut self, number: u32) -> Option<&mut Entry> {
         self.rows.get_mut(number as usize)
     }
 
-    /// Blocks with voxels, each with one bit for each of its voxels.
+    /// Non-empty blocks, each with one bit per voxel.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = (u64, &BlockMask)> {
         let blocks = self.blocks.rows().iter();
         blocks.map(|block| (block.code, &block.leaf))
@@ -165,14 +165,14 @@ impl CellTable {
         self.blocks.bytes() + self.number_bytes + self.rows.capacity() * size_of::<Entry>()
     }
 
-    /// The number of a cell.
+    /// Index of a cell.
     #[inline]
     pub(crate) fn find(&self, code: BlockKey) -> Option<u32> {
         let block = self.blocks.find(code.block())?;
         self.blocks.rows().get(block as usize)?.find(code.place())
     }
 
-    /// True if a cell has a voxel.
+    /// Tests whether a cell has a voxel.
     #[inline]
     pub(crate) fn holds(&self, code: BlockKey) -> bool {
         let block = self.blocks.find(code.block());
@@ -180,7 +180,7 @@ impl CellTable {
         block.is_some_and(|block| block_mask::is_set(&block.leaf, code.place()))
     }
 
-    /// Asks for the block of a cell, which will be searched soon.
+    /// Prefetches the block of a cell.
     #[inline(always)]
     pub(crate) fn prefetch_block(&self, code: BlockKey) {
         if let Some(block) = self.blocks.likely(code.block()) {
@@ -188,7 +188,7 @@ impl CellTable {
         }
     }
 
-    /// The block of a cell, for [`CellTable::find_in`]; asks for the number of its voxel.
+    /// Block of a cell, for [`CellTable::find_in`]; prefetches the index of its voxel.
     #[inline(always)]
     pub(crate) fn block_of(&self, code: BlockKey) -> Option<u32> {
         let at = self.blocks.find(code.block())?;
@@ -200,7 +200,7 @@ impl CellTable {
         Some(at)
     }
 
-    /// The number of a cell of a block; asks for its voxel.
+    /// Index of a cell of a block; prefetches its voxel.
     #[inline(always)]
     pub(crate) fn find_in(&self, block: u32, code: BlockKey) -> Option<u32> {
         let block = self.blocks.rows().get(block as usize)?;
@@ -211,7 +211,7 @@ impl CellTable {
         Some(number)
     }
 
-    /// The number of a cell; a row is made for it if it is new and fewer than `limit` are there.
+    /// Index of a cell; a row is added if it is new and there are fewer than `limit`.
     #[inline(always)]
     pub(crate) fn find_or_add(
         &mut self,
@@ -253,7 +253,7 @@ impl CellTable {
         Some(Place::New(number))
     }
 
-    /// Removes a voxel; the last voxel takes its number, which is given too.
+    /// Removes a voxel; the last voxel takes its index, which is returned too.
     pub(crate) fn remove(&mut self, code: BlockKey) -> Option<(u32, Entry)> {
         let at = self.blocks.find(code.block())?;
         let block = self.blocks.row_mut(at)?;
@@ -281,7 +281,7 @@ impl CellTable {
         *self = CellTable::new();
     }
 
-    /// Checks that every row is found and nothing else is in the blocks.
+    /// Validates that every row is found and nothing else is in the blocks.
     pub(crate) fn validate(&self) -> Result<(), String> {
         self.blocks.validate()?;
         for (number, row) in self.rows.iter().enumerate() {

@@ -7,35 +7,34 @@ use crate::voxels::{OFFSET_UNIT_M, Voxel};
 
 const PER_METRE: f64 = 1.0 / OFFSET_UNIT_M;
 
-/// Sums of positions from the datum in `OFFSET_UNIT_M`, modulo 2^32, and the number of points.
+/// Sums of positions relative to the datum in `OFFSET_UNIT_M`, modulo 2^32, and the number of points.
 ///
-/// With the cell known, the sums of [`most_points`] are known from its centre.
+/// With a known cell, the sums of [`most_points`] are determined by its centre.
 pub(crate) type Point = u32x4;
 
 /// Sums of offsets from the centre of a cell in `OFFSET_UNIT_M`, and the number of points.
 pub(crate) type Offsets = [i64; 4];
 
-/// No point is farther from its lattice point than this, in `OFFSET_UNIT_M`, roundings included.
+/// Maximum distance of a point from its lattice point, in `OFFSET_UNIT_M`, rounding included.
 pub(crate) fn reach(lattice: &Lattice) -> u64 {
     (lattice.covering_radius_m() * PER_METRE) as u64 + 2
 }
 
-/// The greatest number of points of a cell whose sums of offsets surely fit 32 bits: 1 at least, since
-/// no covering radius takes more.
+/// Maximum number of points of a cell whose offset sums fit 32 bits; at least 1 for any covering radius.
 pub(crate) fn most_points(lattice: &Lattice) -> u32 {
     (i32::MAX as u64 / reach(lattice)).max(1) as u32
 }
 
-/// A position (metres) in `OFFSET_UNIT_M`.
+/// Converts a position (metres) to `OFFSET_UNIT_M`.
 #[inline(always)]
 pub(crate) fn fixed(metres: [f64; 3]) -> [i64; 3] {
     metres.map(|m| nearest_integer(m * PER_METRE))
 }
 
-/// The points of a block in fixed point from the datum.
+/// Points of a block in fixed point relative to the datum.
 ///
-/// The base is rounded, then the offset, so that neither the other points of a cloud nor the way it
-/// is cut into blocks matters.
+/// The base is rounded, then the offset, so the result does not depend on the other points of a cloud or on its
+/// division into blocks.
 #[derive(Clone, Copy)]
 pub(crate) struct FixedBlock<'a, T> {
     base: Point,
@@ -44,7 +43,7 @@ pub(crate) struct FixedBlock<'a, T> {
 }
 
 impl<'a, T: Coordinate> FixedBlock<'a, T> {
-    /// Points at `base_m + offset`.
+    /// Creates points at `base_m + offset`.
     pub(crate) fn new(
         base_m: [f64; 3],
         offsets_m: &'a [[T; 3]],
@@ -57,13 +56,13 @@ impl<'a, T: Coordinate> FixedBlock<'a, T> {
         }
     }
 
-    /// The coordinates from the base, unless some point is far.
+    /// Coordinates relative to the base, unless a point is too far.
     #[inline(always)]
     pub(crate) fn near(&self) -> Option<(&[[i32; BatchQuantizer::BLOCK]; 3], Point)> {
         Some((self.near?, self.base))
     }
 
-    /// Point number `i`.
+    /// Point `i`.
     #[inline(always)]
     pub(crate) fn point(&self, i: usize) -> Point {
         match self.near {
@@ -79,7 +78,7 @@ impl<'a, T: Coordinate> FixedBlock<'a, T> {
     }
 }
 
-/// Point number `i` of those whose coordinates from the base fit 32 bits.
+/// Point `i` of a block whose coordinates relative to the base fit 32 bits.
 #[inline(always)]
 pub(crate) fn near_point(
     [x, y, z]: &[[i32; BatchQuantizer::BLOCK]; 3],
@@ -101,13 +100,13 @@ fn low(value: i64) -> u32 {
     value as u32
 }
 
-/// The centre of a cell from the datum, modulo 2^32.
+/// Centre of a cell relative to the datum, modulo 2^32.
 #[inline]
 fn low_center(lattice: &Lattice, code: BlockKey) -> [u32; 3] {
     fixed(lattice.center(code.unpack()).into()).map(low)
 }
 
-/// At most [`most_points`] of a cell as offsets from its centre.
+/// Converts at most [`most_points`] of a cell to offsets from its centre.
 #[inline]
 pub(crate) fn offsets_of(lattice: &Lattice, code: BlockKey, points: &Point) -> Offsets {
     let center = low_center(lattice, code);
@@ -124,7 +123,7 @@ pub(crate) fn offsets_of(lattice: &Lattice, code: BlockKey, points: &Point) -> O
     ]
 }
 
-/// The inverse of [`offsets_of`].
+/// Inverse of [`offsets_of`].
 #[inline]
 pub(crate) fn points_of(lattice: &Lattice, code: BlockKey, offsets: &Offsets) -> Point {
     let center = low_center(lattice, code);
@@ -133,7 +132,7 @@ pub(crate) fn points_of(lattice: &Lattice, code: BlockKey, offsets: &Offsets) ->
     Point::new([sum(0), sum(1), sum(2), count])
 }
 
-/// A voxel of these points.
+/// Voxel of these points.
 #[inline]
 pub(crate) fn voxel_of([x, y, z, count]: Offsets) -> Voxel {
     Voxel {
@@ -142,7 +141,7 @@ pub(crate) fn voxel_of([x, y, z, count]: Offsets) -> Voxel {
     }
 }
 
-/// The points of a voxel.
+/// Points of a voxel.
 #[inline]
 pub(crate) fn offsets_in(voxel: &Voxel) -> Offsets {
     let [x, y, z] = voxel.sum;

@@ -1,14 +1,14 @@
-//! Vectors that keep little room to spare.
+//! Vectors with little spare capacity.
 
-/// Items that there is room for at first.
+/// Initial capacity.
 pub(crate) const FIRST: usize = 64;
 
-/// Most bytes for an item in a vector that grows by [`push`], but for the first.
+/// Maximum bytes per item in a vector that grows by [`push`], except for the first items.
 pub(crate) const fn most_bytes<T>() -> usize {
     size_of::<T>() + size_of::<T>() / 4 + 1
 }
 
-/// Appends an item. The vector grows by a quarter instead of twofold: the memory held counts.
+/// Appends an item; the vector grows by a quarter instead of doubling, to save memory.
 #[inline(always)]
 pub(crate) fn push<T>(vec: &mut Vec<T>, item: T) {
     if vec.len() == vec.capacity() {

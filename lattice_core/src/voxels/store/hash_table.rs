@@ -1,20 +1,19 @@
-//! A hash table of rows that stay in the order of their arrival.
+//! Hash table of rows in insertion order.
 
 use std::hash::{BuildHasher, RandomState};
 use std::sync::LazyLock;
 
 use super::growth;
 
-/// Slots at the start.
+/// Initial number of slots.
 const FIRST_SLOTS: usize = 64;
-/// Slots are doubled beyond this share in use: n / d.
+/// Load factor n / d above which the slots are doubled.
 const FULL: (usize, usize) = (3, 8);
-/// Most bytes of slots for a row: they are at least half as full as when they double, which they do
-/// beside the old ones.
+/// Maximum bytes of slots per row: at least half the load factor, with the old slots beside them while doubling.
 const SLOT_BYTES: usize = 3 * size_of::<u64>() * FULL.1 / FULL.0;
-/// A slot that holds nothing.
+/// Empty slot.
 const FREE: u64 = 0;
-/// The half of a slot that is of the hash; the other is the number plus 1.
+/// Half of a slot that holds the hash; the other is the index plus 1.
 const TAG: u64 = 0xffff_ffff_0000_0000;
 const MIX: u64 = 0x9e37_79b9_7f4a_7c15;
 
@@ -23,17 +22,16 @@ fn number_in(slot: u64) -> u32 {
     (slot as u32).wrapping_sub(1)
 }
 
-/// A row of a table.
+/// Row of a table.
 pub(crate) trait Row {
-    /// The key of the row, which never changes.
+    /// Key of the row, which never changes.
     fn code(&self) -> u64;
 }
 
-/// Rows found by their codes. A row has a number: its place in the order of arrival.
+/// Rows looked up by their codes; the index of a row is its insertion order.
 ///
-/// Rows that came together lie together, in a vector of their own. A slot of the table holds the
-/// number plus 1 and half of the hash, so that a search rarely looks at a row that is not the right
-/// one. The hash is seeded for each process against inputs made to collide.
+/// Rows inserted together are adjacent in a vector of their own. A slot holds the index plus 1 and half of the hash,
+/// so that a search rarely visits a wrong row. The hash is seeded per process against inputs with collisions.
 #[derive(Clone)]
 pub(crate) struct Table<R> {
     slots: Vec<u64>,
@@ -42,19 +40,19 @@ pub(crate) struct Table<R> {
     seed: u64,
 }
 
-/// Number of a code's row.
+/// Index of a code's row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Place {
-    /// A row that was there.
+    /// Existing row.
     Known(u32),
-    /// A row just added, with the next number.
+    /// Row just added, with the next index.
     New(u32),
 }
 
 impl<R: Row> Table<R> {
-    /// Most bytes for a row, the room to grow and the table that it grows from included.
+    /// Maximum bytes per row, including spare capacity and the table that it replaces.
     pub(crate) const ROW_BYTES: usize = growth::most_bytes::<R>() + SLOT_BYTES;
-    /// Most bytes besides those of rows.
+    /// Maximum bytes besides rows.
     pub(crate) const FIRST_BYTES: usize =
         FIRST_SLOTS * size_of::<u64>() + growth::FIRST * size_of::<R>();
 
@@ -73,12 +71,12 @@ impl<R: Row> Table<R> {
         self.rows.len()
     }
 
-    /// All rows by number.
+    /// All rows by index.
     pub(crate) fn rows(&self) -> &[R] {
         &self.rows
     }
 
-    /// The row of a number.
+    /// Row of an index.
     #[inline(always)]
     pub(crate) fn row_mut(&mut self, number: u32) -> Option<&mut R> {
         self.rows.get_mut(number as usize)
@@ -96,7 +94,7 @@ impl<R: Row> Table<R> {
         ((hash >> self.shift) as usize, hash << 32)
     }
 
-    /// The row that a search looks at first.
+    /// Row at the start of a search.
     #[inline(always)]
     pub(crate) fn likely(&self, code: u64) -> Option<&R> {
         let (at, _) = self.home(code);
@@ -119,7 +117,7 @@ impl<R: Row> Table<R> {
         }
     }
 
-    /// The first slot from the home of a code that is free or holds what `wanted` says.
+    /// First slot from the home of a code that is free or matches `wanted`.
     #[inline(always)]
     fn search(&self, code: u64, wanted: impl Fn(u64, u64) -> bool) -> (usize, u64) {
         let (mut at, tag) = self.home(code);
@@ -133,7 +131,7 @@ impl<R: Row> Table<R> {
         }
     }
 
-    /// The slot that holds a code, or the free one where it belongs.
+    /// Slot of a code, or the free one where it belongs.
     #[inline(always)]
     fn slot_of(&self, code: u64) -> (usize, u64) {
         self.search(code, |slot, tag| {
@@ -141,14 +139,14 @@ impl<R: Row> Table<R> {
         })
     }
 
-    /// The number of a code.
+    /// Index of a code.
     #[inline(always)]
     pub(crate) fn find(&self, code: u64) -> Option<u32> {
         let (_, slot) = self.slot_of(code);
         (slot != FREE).then(|| number_in(slot))
     }
 
-    /// The number of a code; a row is made for it if it is new and fewer than `limit` are there.
+    /// Index of a code; a row is added if it is new and there are fewer than `limit`.
     #[inline(always)]
     pub(crate) fn find_or_add(
         &mut self,
@@ -178,7 +176,7 @@ impl<R: Row> Table<R> {
         Some(number as u32)
     }
 
-    /// Makes the slots anew from the rows.
+    /// Rebuilds the slots from the rows.
     fn rebuild(&mut self, slots: usize) {
         self.slots = vec![FREE; slots];
         self.shift = 64 - slots.trailing_zeros();
@@ -189,7 +187,7 @@ impl<R: Row> Table<R> {
         }
     }
 
-    /// Removes a row; the last row takes its number, which is given too.
+    /// Removes a row; the last row takes its index, which is returned too.
     pub(crate) fn remove(&mut self, code: u64) -> Option<(u32, R)> {
         let (at, slot) = self.slot_of(code);
         if slot == FREE {
@@ -201,14 +199,14 @@ impl<R: Row> Table<R> {
             let (moved, tagged) = self.slot_of(self.code(last));
             self.put(moved, (tagged & TAG) | (u64::from(number) + 1));
         }
-        // Before the rows change: the search for later homes looks at them by number.
+        // Before the rows change: the search for later homes accesses them by index.
         self.free(at, number, last);
         Some((number, self.rows.swap_remove(number as usize)))
     }
 
-    /// Empties a slot and moves later ones of the run back, so that no search ends too early.
+    /// Empties a slot and moves back later slots of the run, so that no search ends too early.
     ///
-    /// The last row is known by the number that it will have.
+    /// The last row is identified by its future index.
     fn free(&mut self, mut hole: usize, renamed: u32, last: u32) {
         let mask = self.slots.len() - 1;
         let mut at = hole;
@@ -221,7 +219,7 @@ impl<R: Row> Table<R> {
             let number = number_in(slot);
             let number = if number == renamed { last } else { number };
             let home = self.home(self.code(number)).0;
-            // True if the hole is on the way from its home.
+            // True if the hole is between its home and it.
             if at.wrapping_sub(home) & mask >= at.wrapping_sub(hole) & mask {
                 self.put(hole, slot);
                 hole = at;
@@ -234,7 +232,7 @@ impl<R: Row> Table<R> {
         *self = Table::new();
     }
 
-    /// Checks that every row is found under its number and nothing else is in the slots.
+    /// Validates that every row is found under its index and nothing else is in the slots.
     pub(crate) fn validate(&self) -> Result<(), String> {
         for (number, code) in self.rows.iter().map(R::code).enumerate() {
             if self.find(code) != Some(number as u32) {

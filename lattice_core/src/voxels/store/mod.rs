@@ -1,10 +1,14 @@
 //! Memory of a voxel list, from a point to its row.
 //!
-//! To be read in this order: [`fixed_point`] turns positions into integers, [`point_gather`] adds up
-//! the points of a cell, [`shard`] keeps the voxels of one of 16 parts of a list, [`cell_table`] finds
-//! the row of a cell by its block ([`block_mask`] says which cells of a block are occupied,
-//! [`hash_table`] finds the block), [`payload_columns`] holds what is kept besides count and sum,
-//! [`wide_sums`] the sums that a row has no room for, [`growth`] how vectors grow.
+//! Reading order:
+//! - [`fixed_point`] converts positions to integers.
+//! - [`point_gather`] sums the points of a cell.
+//! - [`shard`] holds the voxels of one of 16 parts of a list.
+//! - [`cell_table`] finds the row of a cell by its block ([`block_mask`] for its occupied cells, [`hash_table`] for
+//!   the block).
+//! - [`payload_columns`] holds the optional columns.
+//! - [`wide_sums`] holds sums that do not fit a row.
+//! - [`growth`] controls the growth of vectors.
 
 pub(crate) mod block_mask;
 mod cell_table;

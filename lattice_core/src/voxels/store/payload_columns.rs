@@ -1,29 +1,29 @@
-//! Further columns of voxels: stamps and labels.
+//! Optional columns of voxels: stamps and labels.
 
 use super::growth;
 
-/// Further columns that a list keeps; each costs memory and time.
+/// Optional columns of a list; each costs memory and time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Payload {
-    /// Stamps of the first and the last point: 16 bytes a voxel.
+    /// Stamps of the first and the last point: 16 bytes per voxel.
     pub stamps: bool,
-    /// Number of points of each label: 24 bytes a voxel and 8 for each label.
+    /// Number of points per label: 24 bytes per voxel and 8 per label.
     pub labels: bool,
 }
 
 impl Payload {
-    /// True if count and sum are all that is kept.
+    /// Tests whether there are no optional columns.
     pub fn is_plain(&self) -> bool {
         *self == Payload::default()
     }
 }
 
-/// Points with one label.
+/// Number of points with one label.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct LabelCount {
-    /// The label.
+    /// Label.
     pub label: u16,
-    /// Number of points; stays at `u32::MAX` once there.
+    /// Number of points; saturates at `u32::MAX`.
     pub count: u32,
 }
 
@@ -49,7 +49,7 @@ impl Stamps {
     }
 }
 
-/// The further columns of a shard; those that are not kept are empty.
+/// Optional columns of a shard; empty if not kept.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Columns {
     payload: Payload,
@@ -57,7 +57,7 @@ pub(crate) struct Columns {
     pub(crate) labels: Vec<Vec<LabelCount>>,
 }
 
-/// Contribution of points to the further columns of a voxel.
+/// Contribution of points to the optional columns of a voxel.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Details {
     pub(crate) stamps: Option<Stamps>,
@@ -73,18 +73,18 @@ impl Columns {
         }
     }
 
-    /// Columns that are kept.
+    /// Kept columns.
     pub(crate) fn payload(&self) -> Payload {
         self.payload
     }
 
-    /// Keeps these stamps, a row for each voxel.
+    /// Sets the stamps, one row per voxel.
     pub(crate) fn set_stamps(&mut self, stamps: Vec<Stamps>) {
         self.payload.stamps = true;
         self.stamps = stamps;
     }
 
-    /// Keeps these labels, a row for each voxel.
+    /// Sets the labels, one row per voxel.
     pub(crate) fn set_labels(&mut self, labels: Vec<Vec<LabelCount>>) {
         self.payload.labels = true;
         self.labels = labels;
@@ -96,7 +96,7 @@ impl Columns {
         self.labels.extend(other.labels.get(number).cloned());
     }
 
-    /// The rows with these numbers, in this order.
+    /// Rows of these indices, in this order.
     pub(crate) fn gather(&self, numbers: impl Iterator<Item = usize>) -> Columns {
         let mut gathered = Columns::new(self.payload);
         if !self.payload.is_plain() {
@@ -114,7 +114,7 @@ impl Columns {
         }
     }
 
-    /// Adds to the columns of voxel `number` that are kept.
+    /// Adds to the kept columns of voxel `number`.
     pub(crate) fn add(&mut self, number: usize, details: &Details) {
         if let (Some(stamps), Some(more)) = (self.stamps.get_mut(number), details.stamps) {
             stamps.add(&more);
@@ -164,7 +164,7 @@ impl Columns {
             + labels.sum::<usize>()
     }
 
-    /// True if every column that is kept has `len` rows and no other has any.
+    /// Tests whether every kept column has `len` rows and every other none.
     pub(crate) fn fits(&self, len: usize) -> bool {
         let expected = |kept: bool| if kept { len } else { 0 };
         self.stamps.len() == expected(self.payload.stamps)

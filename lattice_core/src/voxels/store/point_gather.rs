@@ -1,4 +1,4 @@
-//! Points gathered by cell before they reach the table.
+//! Accumulation of points by cell before they reach the table.
 
 use super::fixed_point::Point;
 use crate::lattice::{BatchQuantizer, BlockKey};
@@ -19,18 +19,17 @@ const EMPTY: Partial = Partial {
     points: Point::ZERO,
 };
 
-/// More than this share of the points of a block in other cells than those before, n / d, and
-/// branches on it cost more than they save.
+/// Fraction n / d of cell changes between consecutive points above which branching on them is slower.
 const SCATTERED: (usize, usize) = (1, 5);
 
-/// The cells that are being filled, as many as fit a direct-mapped table near the processor.
+/// Cells being filled, in a direct-mapped table of the size of the cache.
 ///
-/// Neighbouring beams and successive scans fill the same cells: most points end here, and the large
-/// table sees a cell once for many points.
+/// Adjacent beams and successive scans fill the same cells. Most points end here, and the large table is accessed
+/// once per cell for many points.
 #[derive(Clone, Debug)]
 pub(crate) struct Gather {
     slots: Vec<Partial>,
-    /// Cells that a block of points moved out of their slots.
+    /// Cells that a block of points evicted from their slots.
     moved: Vec<Partial>,
     scattered: bool,
 }
@@ -44,8 +43,9 @@ impl Gather {
         }
     }
 
-    /// Adds the points of a block in order, each as its number's `point`; gives the cells that had to
-    /// make room for others, or have `most_points`. [`BlockKey::NONE`] may be among them.
+    /// Adds the points of a block in order, each as the `point` of its index.
+    ///
+    /// Returns the cells that were evicted or have `most_points`. They may include [`BlockKey::NONE`].
     #[inline(always)]
     pub(crate) fn add(
         &mut self,
@@ -62,7 +62,7 @@ impl Gather {
         self.moved.get(..moved).unwrap_or_default()
     }
 
-    /// With or without a branch on whether a point is in the cell of its slot.
+    /// Adds with or without a branch on whether a point is in the cell of its slot.
     #[inline(always)]
     fn add_to_slots<const BRANCH: bool>(
         &mut self,
@@ -103,7 +103,7 @@ impl Gather {
         moved
     }
 
-    /// Hands out all cells.
+    /// Takes all cells.
     pub(crate) fn drain(&mut self) -> impl Iterator<Item = Partial> {
         let slots = self.slots.iter_mut();
         let partials = slots.map(|slot| std::mem::replace(slot, EMPTY));

@@ -1,4 +1,4 @@
-//! A part of a voxel list that one thread fills.
+//! Part of a voxel list that one thread fills.
 
 use rustc_hash::FxHashMap;
 
@@ -11,13 +11,13 @@ use super::wide_sums::WideSums;
 use crate::lattice::{BlockKey, Lattice};
 use crate::voxels::Voxel;
 
-/// Number of parts of a list.
+/// Number of shards of a list.
 pub(crate) const SHARDS: usize = 16;
 
-/// Cells that are searched together.
+/// Number of cells searched together.
 pub(crate) const BATCH: usize = 128;
 
-/// States of the list in which a voxel came and last changed.
+/// States of the list in which a voxel was added and last changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Life {
     pub(crate) born: u32,
@@ -33,16 +33,16 @@ impl Life {
     }
 }
 
-/// A voxel.
+/// Row of a voxel.
 #[derive(Clone)]
 pub(crate) struct Entry {
     pub(crate) code: u64,
-    /// Sums of up to [`most_points`]; of more the number of their [`WideSums`], and the count.
+    /// Sums of up to [`most_points`]; for more, the index of their [`WideSums`] and the count.
     points: Point,
     pub(crate) life: Life,
 }
 
-/// The voxels of some blocks, in the order of their arrival.
+/// Voxels of some blocks, in insertion order.
 #[derive(Clone)]
 pub(crate) struct Shard {
     pub(crate) voxels: CellTable,
@@ -50,33 +50,33 @@ pub(crate) struct Shard {
     lattice: Lattice,
     most_points: u32,
     wide: WideSums,
-    /// Voxels that went: when they had come, and when they went.
+    /// Removed voxels: states in which they were added and removed.
     pub(crate) removed: FxHashMap<u64, Life>,
 }
 
 impl Entry {
-    /// Number of points; stays at `u32::MAX` once there.
+    /// Number of points; saturates at `u32::MAX`.
     #[inline(always)]
     pub(crate) fn count(&self) -> u32 {
         self.points.as_array()[3]
     }
 
-    /// Number of the sums of a voxel of many points.
+    /// Index of the sums of a voxel with many points.
     fn wide(&self) -> u32 {
         self.points.as_array()[0]
     }
 }
 
-/// Number of the shard of a cell; all cells of a block belong to one.
+/// Shard index of a cell; all cells of a block belong to one.
 #[inline(always)]
 pub(crate) fn shard_of(code: BlockKey) -> usize {
     (code.block().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 60) as usize
 }
 
 impl Shard {
-    /// Most bytes for a voxel, its columns and its memory once it is removed aside.
+    /// Maximum bytes per voxel, including its columns and its record after removal.
     pub(crate) const VOXEL_BYTES: usize = CellTable::VOXEL_BYTES + WideSums::ROW_BYTES;
-    /// Most bytes besides those of voxels.
+    /// Maximum bytes besides voxels.
     pub(crate) const FIRST_BYTES: usize = CellTable::FIRST_BYTES + WideSums::FIRST_BYTES;
 
     pub(crate) fn new(lattice: &Lattice, columns: Columns) -> Shard {
@@ -101,14 +101,14 @@ impl Shard {
             + self.removed.capacity() * (size_of::<(u64, Life)>() + 1)
     }
 
-    /// The voxel of a cell, with its number.
+    /// Voxel of a cell, with its index.
     #[inline]
     pub(crate) fn get(&self, code: BlockKey) -> Option<(u32, &Entry)> {
         let number = self.voxels.find(code)?;
         Some((number, self.voxels.rows().get(number as usize)?))
     }
 
-    /// The number of a cell, which becomes a voxel if fewer than `limit` are there.
+    /// Index of a cell, added as a voxel if there are fewer than `limit`.
     #[inline(always)]
     pub(crate) fn find_or_add(&mut self, code: BlockKey, limit: usize, now: u32) -> Option<u32> {
         let empty = || Entry {
@@ -131,7 +131,7 @@ impl Shard {
         }
     }
 
-    /// Takes back the removal of a voxel that comes again, for consumers that know it still.
+    /// Cancels the removal of a voxel that reappears, for consumers that still have it.
     #[inline]
     fn remember(&mut self, code: u64, number: u32) {
         if self.removed.is_empty() {
@@ -200,25 +200,24 @@ impl Shard {
         }
     }
 
-    /// A voxel as others see it.
+    /// Public form of a voxel.
     #[inline]
     pub(crate) fn voxel(&self, code: BlockKey, entry: &Entry) -> Voxel {
         voxel_of(self.offsets(code, entry))
     }
 
-    /// Adds the gathered points of cells of this shard in steps, so that the waits for memory of
-    /// one step overlap.
+    /// Adds the gathered points of cells of this shard in stages, so that the cache misses of one stage overlap.
     pub(crate) fn add_batch(&mut self, batch: &[Partial], now: u32) {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("popcnt") {
-            // SAFETY: the machine has the instruction.
+            // SAFETY: the instruction was detected.
             #[allow(unsafe_code)]
             return unsafe { self.add_batch_popcnt(batch, now) };
         }
         self.add_batch_anywhere(batch, now);
     }
 
-    /// With an instruction that counts bits, for the ranks of voxels in their blocks.
+    /// Compiled with an instruction that counts bits, for the ranks of voxels in their blocks.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "popcnt")]
     fn add_batch_popcnt(&mut self, batch: &[Partial], now: u32) {
@@ -234,7 +233,7 @@ impl Shard {
         for (place, partial) in places.iter_mut().zip(batch) {
             *place = self.voxels.block_of(partial.code);
         }
-        // From the numbers of blocks to those of voxels.
+        // From the indices of blocks to those of voxels.
         for (place, partial) in places.iter_mut().zip(batch) {
             let known = place.and_then(|block| self.voxels.find_in(block, partial.code));
             *place = match known {
@@ -249,7 +248,7 @@ impl Shard {
         }
     }
 
-    /// Removes a voxel; false if it was not there.
+    /// Removes a voxel; false if it does not exist.
     pub(crate) fn remove(&mut self, code: BlockKey, now: u32) -> bool {
         let Some((number, entry)) = self.voxels.remove(code) else {
             return false;

@@ -1,23 +1,23 @@
-//! Sums of voxels with more points than a row has room for.
+//! Sums of voxels with more points than fit a row.
 
 use super::fixed_point::Offsets;
 use super::growth;
 
-/// Number of no row.
+/// Invalid index.
 const NONE: u32 = u32::MAX;
 
-/// Sums with numbers of their own, which are used again.
+/// Sums with reusable indices.
 #[derive(Clone)]
 pub(crate) struct WideSums {
     rows: Vec<Offsets>,
-    /// The last number that was given back; its row holds the one before.
+    /// Last released index; its row holds the previous one.
     free: u32,
 }
 
 impl WideSums {
-    /// Most bytes for a row.
+    /// Maximum bytes per row.
     pub(crate) const ROW_BYTES: usize = growth::most_bytes::<Offsets>();
-    /// Most bytes besides those of rows.
+    /// Maximum bytes besides rows.
     pub(crate) const FIRST_BYTES: usize = growth::FIRST * size_of::<Offsets>();
 
     pub(crate) fn new() -> WideSums {
@@ -31,7 +31,7 @@ impl WideSums {
         self.rows.capacity() * size_of::<Offsets>()
     }
 
-    /// Keeps sums; gives their number, which is below 2^32 - 1.
+    /// Stores sums and returns their index, below 2^32 - 1.
     pub(crate) fn put(&mut self, sums: Offsets) -> u32 {
         let number = self.free;
         if let Some(row) = self.rows.get_mut(number as usize) {
@@ -44,12 +44,12 @@ impl WideSums {
         }
     }
 
-    /// The sums of a number; zero for numbers that were not given.
+    /// Sums of an index; zero for invalid ones.
     pub(crate) fn get(&self, number: u32) -> Offsets {
         self.rows.get(number as usize).copied().unwrap_or_default()
     }
 
-    /// Adds to the sums of a number and gives the number of points; sums wrap.
+    /// Adds to the sums of an index and returns the number of points; sums wrap.
     pub(crate) fn add(&mut self, number: u32, more: &Offsets) -> i64 {
         let Some(sums) = self.rows.get_mut(number as usize) else {
             return 0;
@@ -60,7 +60,7 @@ impl WideSums {
         sums[3]
     }
 
-    /// Takes a number back.
+    /// Releases an index.
     pub(crate) fn free(&mut self, number: u32) {
         if let Some(row) = self.rows.get_mut(number as usize) {
             *row = [i64::from(self.free), 0, 0, 0];
@@ -72,7 +72,7 @@ impl WideSums {
         *self = WideSums::new();
     }
 
-    /// Numbers in use.
+    /// Number of used indices.
     pub(crate) fn used(&self) -> usize {
         let mut free = 0;
         let mut next = self.free;

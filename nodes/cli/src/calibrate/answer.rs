@@ -3,7 +3,7 @@
 use std::fmt;
 
 use lattice_core::registration::{
-    Calibration, DirectionKind, Profile, Registration, p_wrong_in_words,
+    Calibration, DirectionKind, Profile, Registration, describe_p_wrong,
 };
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::Serialize;
@@ -132,7 +132,7 @@ impl Answer {
             verdict: Some(calibration.verdict.name()),
             reason: calibration.reason.clone(),
             method: calibration.method.to_owned(),
-            map_from_cloud: Pose::of(&calibration.map_from_headset),
+            map_from_cloud: Pose::of(&calibration.target_from_source),
             // Symmetric, so that the order of columns is that of rows.
             covariance: Some(covariance.iter().copied().collect()),
             sigma_m: Some([0, 1, 2].map(sigma)),
@@ -140,7 +140,7 @@ impl Answer {
             profile: Some(profile.name()),
             scale: calibration.scale.map(|estimate| estimate.scale),
             scale_sigma: calibration.scale.map(|estimate| estimate.sigma),
-            log_margin: Some(calibration.margin.log).filter(|margin| margin.is_finite()),
+            log_margin: Some(calibration.margin.log_ratio).filter(|margin| margin.is_finite()),
             p_wrong: Some(calibration.margin.p_wrong()),
             inlier_fraction: calibration.inlier_fraction,
             rmse_m: calibration.rmse_m,
@@ -245,7 +245,7 @@ impl fmt::Display for Answer {
             writeln!(
                 f,
                 "log-margin     {margin:.1}, {}",
-                p_wrong_in_words(p_wrong)
+                describe_p_wrong(p_wrong)
             )?;
         }
         writeln!(

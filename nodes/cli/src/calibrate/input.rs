@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use lattice_core::pose::Axes;
-use lattice_core::registration::{Confusion, HeadsetScan, SemanticCloud, voxel_downsample};
+use lattice_core::registration::{Confusion, SemanticCloud, SourceCloud, voxel_downsample};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use crate::CliResult;
@@ -121,7 +121,7 @@ fn size_m(cloud: &SemanticCloud) -> Vector3<f64> {
 /// Clouds about a point of their own frame.
 pub struct Scans {
     /// Their points and sensors, from that point.
-    pub scans: Vec<HeadsetScan>,
+    pub scans: Vec<SourceCloud>,
     /// The point: their origin, or in whole metres their middle if that is far away, as in UTM.
     pub middle_m: Vector3<f64>,
 }
@@ -133,19 +133,19 @@ pub fn headset_scans(
     sensor_m: Option<Point3<f64>>,
     options: &PointFileOptions,
 ) -> CliResult<Scans> {
-    let read = |path: &PathBuf| -> CliResult<HeadsetScan> {
+    let read = |path: &PathBuf| -> CliResult<SourceCloud> {
         let mut cloud = read_semantic(path, options)?.with_points(path)?.cloud;
         for point in &mut cloud.points_m {
             *point = axes.point_to_ros(point);
         }
-        Ok(HeadsetScan { cloud, sensor_m })
+        Ok(SourceCloud { cloud, sensor_m })
     };
     let scans = paths.iter().map(read).collect::<CliResult<Vec<_>>>()?;
     Ok(Scans::about_middle(scans))
 }
 
 impl Scans {
-    fn about_middle(mut scans: Vec<HeadsetScan>) -> Self {
+    fn about_middle(mut scans: Vec<SourceCloud>) -> Self {
         let median = |axis: usize, _| {
             let points = scans.iter().flat_map(|scan| &scan.cloud.points_m);
             let mut values: Vec<f64> = points.filter_map(|p| p.coords.get(axis).copied()).collect();
@@ -232,7 +232,7 @@ mod tests {
 
     #[test]
     fn clouds_that_are_far_away_are_taken_about_their_middle() {
-        let cloud = |at: [f64; 3]| HeadsetScan {
+        let cloud = |at: [f64; 3]| SourceCloud {
             cloud: SemanticCloud::unlabelled(vec![
                 Point3::from(at) + Vector3::new(-3.0, 1.0, 0.25),
                 Point3::from(at),

@@ -2,8 +2,8 @@
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lattice_core::registration::{
-    HeadsetScan, NamedMethod, PrepareOptions, PreparedCloud, RegisterOptions, Registration,
-    SemanticCloud, register, voxel_downsample,
+    NamedMethod, PrepareOptions, PreparedCloud, RegisterOptions, Registration, SemanticCloud,
+    SourceCloud, register, voxel_downsample,
 };
 use nalgebra::Isometry3;
 use std::time::Instant;
@@ -45,7 +45,7 @@ impl MethodName {
 pub fn register_once(
     method: &RegisterOptions,
     (map, cell_side_m): (SemanticCloud, f64),
-    headset_scans: &[HeadsetScan],
+    headset_scans: &[SourceCloud],
     start: &Isometry3<f64>,
     times: &mut Times,
 ) -> Result<(Registration, usize), String> {
@@ -62,10 +62,10 @@ pub fn register_once(
 }
 
 /// All headset scans as one cloud; points of headset scans without labels are unlabelled.
-fn together(headset_scans: &[HeadsetScan]) -> SemanticCloud {
+fn together(headset_scans: &[SourceCloud]) -> SemanticCloud {
     let labelled = headset_scans.iter().any(|s| !s.cloud.labels.is_empty());
     let mut all = SemanticCloud::default();
-    for HeadsetScan { cloud, .. } in headset_scans {
+    for SourceCloud { cloud, .. } in headset_scans {
         if labelled {
             all.labels.extend((0..cloud.len()).map(|i| cloud.label(i)));
         }

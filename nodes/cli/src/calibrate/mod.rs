@@ -13,8 +13,8 @@ use std::time::Instant;
 use clap::Args;
 use lattice_core::pose::Axes;
 use lattice_core::registration::{
-    CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan, SemanticCloud, Stage,
-    Verdict, calibrate,
+    CalibrationMap, CalibrationOptions, CalibrationRequest, SemanticCloud, SourceCloud, Stage,
+    Verdict, register_global,
 };
 use nalgebra::Isometry3;
 
@@ -153,7 +153,7 @@ impl Calibrate {
     fn find(
         &self,
         (map, cell_side_m): (SemanticCloud, f64),
-        (headset_scans, start): (&[HeadsetScan], Option<Isometry3<f64>>),
+        (headset_scans, start): (&[SourceCloud], Option<Isometry3<f64>>),
         options: &CalibrationOptions,
         names: &BTreeMap<u16, String>,
         times: &mut Times,
@@ -169,12 +169,12 @@ impl Calibrate {
             .map_err(|e| format!("{}: {e}", self.map.display()))?;
         times.map_ms = milliseconds(started);
         let request = CalibrationRequest {
-            headset_scans,
+            source_clouds: headset_scans,
             start,
             confusion: known.as_ref(),
         };
         let started = Instant::now();
-        let calibration = calibrate(&map, &request, options, &Shown(&bar));
+        let calibration = register_global(&map, &request, options, &Shown(&bar));
         times.calibrate_ms = milliseconds(started);
         bar.done();
         if let (Some(path), Verdict::Ok) = (&self.confusion, calibration.verdict) {

@@ -3,7 +3,7 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lattice_core::pose::Axes;
-use lattice_core::registration::{CalibrationOptions, HeadsetScan, Profile};
+use lattice_core::registration::{CalibrationOptions, Profile, SourceCloud};
 
 /// Sensor and thresholds; each that is left out is that of the profile.
 #[derive(Args)]
@@ -114,7 +114,7 @@ impl SearchOptions {
         &self,
         axes: Axes,
         max_points: usize,
-        headset_scans: &[HeadsetScan],
+        headset_scans: &[SourceCloud],
     ) -> Result<CalibrationOptions, String> {
         let Sensor(asked) = self.profile;
         let profile = asked.unwrap_or_else(|| Profile::of(headset_scans));

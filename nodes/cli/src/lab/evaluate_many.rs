@@ -5,8 +5,8 @@ use super::processors;
 use crate::CliResult;
 use clap::Args;
 use lattice_lab::evaluate::{
-    Case, Pair, Results, Settings, Trap, reliability_report, run_cases, settings_of, town_report,
-    traps_report,
+    AdversarialScene, Case, Pair, Results, Settings, adversarial_report, reliability_report,
+    run_cases, settings_of, town_report,
 };
 use lattice_lab::{AnyError, Report, markdown, write_report};
 use std::path::{Path, PathBuf};
@@ -34,9 +34,9 @@ pub struct Many {
 impl Many {
     /// Runs `lattice evaluate traps`.
     pub fn traps(self) -> CliResult {
-        let settings = settings_of(Trap::CELL_SIDE_M);
-        self.show(&traps_report(
-            &self.measure(&Trap::all(), &settings)?.sorted(),
+        let settings = settings_of(AdversarialScene::CELL_SIDE_M);
+        self.show(&adversarial_report(
+            &self.measure(&AdversarialScene::all(), &settings)?.sorted(),
         ))
     }
 

@@ -1,7 +1,7 @@
 //! Quantizing and packing keys, without a store.
 
 use super::{Report, Spent, timed};
-use crate::printed::Search27;
+use crate::paper_values::Search27;
 use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeIndex, Simd};
 use nalgebra::Isometry3;
 use rayon::prelude::*;

@@ -5,16 +5,16 @@
 //! Results are lines of a file that grows and is continued; the report is made of all of them, failures
 //! included.
 
+mod adversarial;
+mod calibration_regression;
 mod chain;
 mod figures;
 mod files;
 mod house;
 mod initial_guess;
 pub mod kitti;
-mod looks;
 mod many;
 mod methods;
-mod odds;
 mod pairs;
 mod reliability;
 mod report;
@@ -26,9 +26,10 @@ mod statistics;
 mod summary;
 mod testbed;
 mod town;
-mod traps;
 mod trial;
+mod views;
 
+pub use adversarial::{AdversarialScene, adversarial_report};
 pub use chain::{ChainOptions, chain_report, chain_settings, run_chain};
 pub use house::read_house;
 pub use many::{Case, run_cases, settings_of};
@@ -50,6 +51,5 @@ pub(crate) use summary::{PRINTED, Printed};
 pub(crate) use testbed::Scenario;
 pub use testbed::Testbed;
 pub use town::{Pair, town_report};
-pub use traps::{Trap, traps_report};
 pub(crate) use trial::{Bounds, OURS, Trial, WRONG};
 pub use trial::{TIMED, TRACKED};

@@ -27,7 +27,7 @@ pub fn trial(
     overlap: f64,
 ) -> Trial {
     // Times are taken beside other trials: they would say nothing.
-    let trial = Trial::of_pose(cell, OURS, &found.map_from_headset, truth, seen_m, 0.0);
+    let trial = Trial::of_pose(cell, OURS, &found.target_from_source, truth, seen_m, 0.0);
     Trial {
         overlap: Some(rounded(overlap)),
         ..trial.with_judgement(found, truth)

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use plotters::prelude::*;
 
-use super::odds::OddsCurve;
+use super::calibration_regression::CalibrationCurve;
 use super::statistics::{Share, median};
 use super::trial::{Judged, OURS, Trial};
 use crate::AnyError;
@@ -120,7 +120,7 @@ fn odds(sets: &[Set]) -> Table {
         let all = sets.iter().flat_map(|(_, trials)| judged(trials));
         let outcomes: Vec<(f64, bool)> =
             all.map(|(trial, _, p)| (p, is_elsewhere(trial))).collect();
-        let curve = OddsCurve::fit(&outcomes);
+        let curve = CalibrationCurve::fit(&outcomes);
         let slope = curve.map(|curve| curve.slope());
         let mut cells = vec![name.into(), outcomes.len().into()];
         cells.push(slope.map_or("-".into(), |(b, sigma)| {

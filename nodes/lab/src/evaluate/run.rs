@@ -10,7 +10,7 @@ use super::trial::{OURS, TIMED, TRACKED, Trial, rounded};
 use crate::random::seed_of;
 use crate::simulate::house::Scene;
 use crate::{AnyError, pool};
-use lattice_core::registration::{CalibrationOptions, CalibrationRequest, calibrate, track};
+use lattice_core::registration::{CalibrationOptions, CalibrationRequest, register_global, track};
 use nalgebra::Isometry3;
 use std::collections::HashSet;
 use std::path::Path;
@@ -238,13 +238,13 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
         }
         TaskMethod::Ours | TaskMethod::Timed => {
             let request = CalibrationRequest {
-                headset_scans: &scenario.headset_scans,
+                source_clouds: &scenario.headset_scans,
                 start,
                 confusion: None,
             };
-            let calibration = calibrate(&scenario.map, &request, &options, &());
+            let calibration = register_global(&scenario.map, &request, &options, &());
             let wall_ms = ms(started);
-            trial(&calibration.map_from_headset, wall_ms)
+            trial(&calibration.target_from_source, wall_ms)
                 .with_judgement(&calibration, &scenario.truth)
         }
         TaskMethod::Tracked => {
@@ -252,7 +252,7 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
             let scan = scenario.headset_scans.first();
             let update = scan.map(|scan| track(&scenario.map, scan, &start, &options));
             let wall_ms = ms(started);
-            trial(&update.map_or(start, |u| u.map_from_headset), wall_ms)
+            trial(&update.map_or(start, |u| u.target_from_source), wall_ms)
         }
     }
 }

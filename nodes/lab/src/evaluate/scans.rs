@@ -1,17 +1,17 @@
 //! Parts of a scan, calibrated in another scan of the same place: real data, whose truth is where the whole scan lies.
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan,
-    SemanticCloud, Verdict, calibrate, voxel_downsample,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, SemanticCloud,
+    SourceCloud, Verdict, register_global, voxel_downsample,
 };
 use nalgebra::{Isometry3, Point3};
 
 use super::Settings;
-use super::looks::{any_pose, keep_sector};
 use super::many::{Case, settings_of};
 use super::pairs::{columns, line, of_scenes, shared, trial};
 use super::settings::Cell;
 use super::trial::{Trial, WRONG};
+use super::views::{any_pose, keep_sector};
 use crate::AnyError;
 use crate::options::within;
 use crate::random::Stream;
@@ -24,7 +24,7 @@ const SHARED_CELLS: f64 = 2.0;
 pub struct Scans {
     map: CalibrationMap,
     cell_side_m: f64,
-    scan: HeadsetScan,
+    scan: SourceCloud,
     map_from_scan: Isometry3<f64>,
     options: CalibrationOptions,
 }
@@ -45,14 +45,14 @@ impl Scans {
     /// If the map has no points, or no pose is given and the calibration is not OK.
     pub fn new(
         (map, cell_side_m): (SemanticCloud, f64),
-        scan: HeadsetScan,
+        scan: SourceCloud,
         map_from_scan: Option<Isometry3<f64>>,
         options: CalibrationOptions,
     ) -> Result<Scans, AnyError> {
         let mut scans = Scans {
             map: CalibrationMap::new(map, cell_side_m)?,
             cell_side_m,
-            scan: HeadsetScan {
+            scan: SourceCloud {
                 sensor_m: scan.sensor_m.or(Some(Point3::origin())),
                 ..scan
             },
@@ -69,7 +69,7 @@ impl Scans {
     fn of_all_points(&self) -> Result<Isometry3<f64>, AnyError> {
         let found = self.find(&self.scan);
         match found.verdict {
-            Verdict::Ok => Ok(found.map_from_headset),
+            Verdict::Ok => Ok(found.target_from_source),
             verdict => Err(format!(
                 "the whole scan is {}: {}; give its pose",
                 verdict.name(),
@@ -118,13 +118,13 @@ impl Scans {
         }
     }
 
-    fn find(&self, scan: &HeadsetScan) -> Calibration {
+    fn find(&self, scan: &SourceCloud) -> Calibration {
         let request = CalibrationRequest {
-            headset_scans: std::slice::from_ref(scan),
+            source_clouds: std::slice::from_ref(scan),
             start: None,
             confusion: None,
         };
-        calibrate(&self.map, &request, &self.options, &())
+        register_global(&self.map, &request, &self.options, &())
     }
 }
 

@@ -255,7 +255,7 @@ mod tests {
         let truth = Isometry3::identity();
         let trial = Trial::of_pose(&cell, method, &pose, &truth, &[Vector3::x().into()], 10.0);
         let calibration = Calibration {
-            map_from_headset: pose,
+            target_from_source: pose,
             covariance: Matrix6::identity() * 1e-4,
             ..Calibration::refused(verdict, "")
         };

@@ -10,7 +10,7 @@ use crate::simulate::house::{
 };
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::registration::{
-    CalibrationMap, HeadsetScan, PrepareOptions, PreparedCloud, SemanticCloud, voxel_downsample,
+    CalibrationMap, PrepareOptions, PreparedCloud, SemanticCloud, SourceCloud, voxel_downsample,
 };
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::OnceLock;
@@ -38,7 +38,7 @@ pub struct View {
 pub struct Scenario {
     /// Prepared map; also the target of single registrations.
     pub map: CalibrationMap,
-    pub headset_scans: Vec<HeadsetScan>,
+    pub headset_scans: Vec<SourceCloud>,
     /// All points of the headset as one cloud.
     pub full: PreparedCloud,
     /// The cloud thinned to the cells of the map: the source of single registrations.
@@ -80,7 +80,7 @@ impl Testbed {
         let seed = seed_of(&[LABELS, view.seed, view.scene as u64]);
         let draw = LabelDraw::new(&self.house, std::slice::from_ref(&view.trial), q, seed)?;
         let map = self.survey(view.seed)?.cloud(&draw.map);
-        let scan = |scan: &HouseScan| HeadsetScan {
+        let scan = |scan: &HouseScan| SourceCloud {
             cloud: left_part(
                 draw.headset.cloud(&scan.points_m, &scan.regions),
                 &scan.sensor_m,
@@ -88,7 +88,7 @@ impl Testbed {
             ),
             sensor_m: Some(scan.sensor_m),
         };
-        let headset_scans: Vec<HeadsetScan> = view.trial.headset_scans.iter().map(scan).collect();
+        let headset_scans: Vec<SourceCloud> = view.trial.headset_scans.iter().map(scan).collect();
         let mut all = SemanticCloud::default();
         for headset_scan in &headset_scans {
             all.points_m.extend_from_slice(&headset_scan.cloud.points_m);

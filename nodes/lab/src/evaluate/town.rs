@@ -1,7 +1,7 @@
 //! Lidar scans of a simulated street, some metres apart, registered without a start.
 
 use lattice_core::registration::{
-    CalibrationMap, CalibrationRequest, HeadsetScan, Profile, calibrate, voxel_downsample,
+    CalibrationMap, CalibrationRequest, Profile, SourceCloud, register_global, voxel_downsample,
 };
 use nalgebra::Point3;
 
@@ -74,14 +74,14 @@ impl Case for Pair {
         let thinned = voxel_downsample(&cloud, CELL_SIDE_M).points_m;
         let overlap = shared(&thinned, map.cloud(), &truth, SHARED_M);
         let request = CalibrationRequest {
-            headset_scans: &[HeadsetScan {
+            source_clouds: &[SourceCloud {
                 cloud,
                 sensor_m: Some(Point3::origin()),
             }],
             start: None,
             confusion: None,
         };
-        let found = calibrate(&map, &request, &Profile::Lidar.options(), &());
+        let found = register_global(&map, &request, &Profile::Lidar.options(), &());
         Ok(trial(cell, &found, &truth, &thinned, overlap))
     }
 }

@@ -102,13 +102,13 @@ impl Judged {
     pub fn p_wrong_by_margin(&self) -> Option<f64> {
         let parts = self.even.zip(self.chance);
         let evidence = self.margin.zip(parts).zip(self.unexplained);
-        let p_wrong = evidence.map(|((log, (even, chance)), unexplained)| {
+        let p_wrong = evidence.map(|((log_ratio, (indistinct, sigma)), outliers)| {
             let margin = Margin {
-                log,
-                even,
-                chance,
-                unexplained,
-                places: self.places.unwrap_or(1.0),
+                log_ratio,
+                indistinct,
+                indistinct_sigma: sigma,
+                outliers,
+                alternatives: self.places.unwrap_or(1.0),
             };
             margin.p_wrong()
         });
@@ -167,17 +167,20 @@ impl Trial {
                 verdict: calibration.verdict.name().to_owned(),
                 reason: calibration.reason.clone(),
                 chosen: calibration.method.to_owned(),
-                margin: margin.log.is_finite().then_some(rounded(margin.log)),
+                margin: margin
+                    .log_ratio
+                    .is_finite()
+                    .then_some(rounded(margin.log_ratio)),
                 p_wrong: Some(margin.p_wrong()),
-                even: Some(margin.even),
-                chance: Some(margin.chance),
-                unexplained: Some(margin.unexplained),
-                places: Some(margin.places),
+                even: Some(margin.indistinct),
+                chance: Some(margin.indistinct_sigma),
+                unexplained: Some(margin.outliers),
+                places: Some(margin.alternatives),
                 scale: calibration
                     .scale
                     .map(|s| (rounded(s.scale), rounded(s.sigma))),
                 scale_gain: calibration.scale.map(|s| rounded(s.gain)),
-                other_reading_ahead: calibration.other_reading_ahead.map(rounded),
+                other_reading_ahead: calibration.axis_hypothesis_lead.map(rounded),
                 fit: Some((
                     rounded(fit.chi_square),
                     rounded(fit.floating),
@@ -219,7 +222,7 @@ pub(super) fn rounded(value: f64) -> f64 {
 /// e^T C^-1 e of the position and the rotation vector by which a pose is off, both along the axes of
 /// the map.
 fn nees(calibration: &Calibration, truth: &Isometry3<f64>) -> Option<f64> {
-    let pose = &calibration.map_from_headset;
+    let pose = &calibration.target_from_source;
     let moved = pose.translation.vector - truth.translation.vector;
     let turned = (pose.rotation * truth.rotation.inverse()).scaled_axis();
     let error = Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z);
@@ -254,10 +257,10 @@ mod tests {
         assert!(trial.is_within(WRONG) && !trial.is_accepted());
 
         let calibration = Calibration {
-            map_from_headset: off,
+            target_from_source: off,
             covariance: Matrix6::from_diagonal(&Vector6::from([1e-4; 6])),
             margin: Margin {
-                log: f64::INFINITY,
+                log_ratio: f64::INFINITY,
                 ..Margin::default()
             },
             ..Calibration::refused(Verdict::Ok, "")

@@ -11,7 +11,7 @@ pub use options::{Color, LabelOptions, SemanticOptions, palette_from_params};
 pub use write::{color_of, message_from_semantic};
 
 use lattice_core::cloud::{CloudError, CloudLimits, CloudView};
-use lattice_core::registration::{HeadsetScan, LabelDistribution, SemanticCloud};
+use lattice_core::registration::{LabelDistribution, SemanticCloud, SourceCloud};
 use lattice_msgs::sensor_msgs::PointCloud2;
 use thiserror::Error;
 
@@ -146,13 +146,13 @@ fn semantic_from_view(
 pub fn headset_scan_from_message(
     message: &PointCloud2,
     options: &SemanticOptions,
-) -> Result<(HeadsetScan, SemanticReport), SemanticError> {
+) -> Result<(SourceCloud, SemanticReport), SemanticError> {
     let layout = cloud::layout_of(message);
     let view = layout.view(&message.data, &limits(options))?;
     let (cloud, report) = semantic_from_view(&view, options)?;
     let viewpoint_m = viewpoint_of(&view, MAX_MOVED_M);
     let sensor_m = viewpoint_m.map(|v| options.axes.to_ros(v).into());
-    Ok((HeadsetScan { cloud, sensor_m }, report))
+    Ok((SourceCloud { cloud, sensor_m }, report))
 }
 
 /// The most probable class of each point of a message, in its order, NaN points included; `None` if

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use lattice_core::lattice::LatticeKind;
 use lattice_core::registration::{
-    Calibration, CalibrationOptions, HeadsetScan, Progress, Stage, TrackUpdate, Verdict,
+    Calibration, CalibrationOptions, Progress, SourceCloud, Stage, TrackUpdate, Verdict,
 };
 use lattice_msgs::calibration::{CalibrateGoal, CalibrateResult, CalibrationResult};
 use lattice_msgs::geometry_msgs::TransformStamped;
@@ -37,13 +37,13 @@ pub struct Fake {
 
 pub fn found(verdict: Verdict, x: f64) -> Calibration {
     let mut found = Calibration::refused(verdict, format!("{verdict:?}"));
-    found.map_from_headset = Isometry3::translation(x, 0.0, 0.0);
+    found.target_from_source = Isometry3::translation(x, 0.0, 0.0);
     found.inlier_fraction = 0.9;
     found
 }
 
 impl Search for Fake {
-    fn unlearn(&mut self) {
+    fn reset_label_confusion(&mut self) {
         self.unlearned += 1;
     }
 
@@ -58,7 +58,7 @@ impl Search for Fake {
 
     fn calibrate(
         &mut self,
-        headset_scans: &[HeadsetScan],
+        headset_scans: &[SourceCloud],
         start: Option<Isometry3<f64>>,
         progress: &dyn Progress,
     ) -> Calibration {
@@ -73,11 +73,11 @@ impl Search for Fake {
         next.unwrap_or_else(|| found(Verdict::Ok, 1.0))
     }
 
-    fn track(&mut self, _: &HeadsetScan, map_from_headset: &Isometry3<f64>) -> Option<TrackUpdate> {
+    fn track(&mut self, _: &SourceCloud, map_from_headset: &Isometry3<f64>) -> Option<TrackUpdate> {
         let fits = self.fits.pop_front().unwrap_or(0.9);
         Some(TrackUpdate {
             fits: fits >= CalibrationOptions::default().min_inliers,
-            map_from_headset: Isometry3::translation(0.001, 0.0, 0.0) * map_from_headset,
+            target_from_source: Isometry3::translation(0.001, 0.0, 0.0) * map_from_headset,
             inlier_fraction: fits,
             rmse_m: 0.01,
         })

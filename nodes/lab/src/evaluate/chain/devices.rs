@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::Lattice;
-use lattice_core::registration::{HeadsetScan, LabelDistribution, SemanticCloud, UNLABELED};
+use lattice_core::registration::{LabelDistribution, SemanticCloud, SourceCloud, UNLABELED};
 use lattice_core::voxels::{Payload, VoxelList};
 use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::headset::HeadsetMesh;
@@ -108,7 +108,7 @@ impl Mapper {
             let problem = self.machine.problem().unwrap_or("no partner");
             format!("semantic_cloud made no points: {problem}")
         })?;
-        let Some(HeadsetScan { cloud, .. }) = points(cloud)? else {
+        let Some(SourceCloud { cloud, .. }) = points(cloud)? else {
             // A wall too near to be seen.
             return Ok(());
         };
@@ -149,7 +149,7 @@ pub(super) fn headset_scan(
     segmenter: &Mutex<Segmenter>,
     chunks: &[Arc<HeadsetMesh>],
     scan: &HouseScan,
-) -> Result<Option<Both<HeadsetScan>>, AnyError> {
+) -> Result<Option<Both<SourceCloud>>, AnyError> {
     let found = labelled(segmenter, image, PERIOD_NS)?;
     let found = look(chunks, scan, found.labels, found.confidence)?;
     let true_labels = image.labels_message(header(CAMERA, PERIOD_NS));
@@ -163,7 +163,7 @@ fn look(
     scan: &HouseScan,
     labels: Image,
     confidence: Option<Image>,
-) -> Result<Option<HeadsetScan>, AnyError> {
+) -> Result<Option<SourceCloud>, AnyError> {
     let mut options = HeadsetOptions::from_params(&Params::default())?;
     options.look.stride = 1;
     options.use_confidence = confidence.is_some();
@@ -197,7 +197,7 @@ fn look(
 }
 
 /// Points, labels and viewpoint of a cloud as `semantic_icp_server` reads them; none of an empty one.
-fn points(cloud: &PointCloud2) -> Result<Option<HeadsetScan>, AnyError> {
+fn points(cloud: &PointCloud2) -> Result<Option<SourceCloud>, AnyError> {
     if cloud.width == 0 || cloud.height == 0 {
         return Ok(None);
     }
@@ -239,7 +239,7 @@ pub(super) fn right_share(found: &SemanticCloud, truth: &SemanticCloud) -> Resul
 }
 
 /// The points and labels of all scans.
-pub(super) fn together(scans: &[HeadsetScan]) -> SemanticCloud {
+pub(super) fn together(scans: &[SourceCloud]) -> SemanticCloud {
     let clouds = || scans.iter().map(|scan| &scan.cloud);
     SemanticCloud {
         points_m: clouds()

@@ -14,8 +14,8 @@ use std::sync::{Mutex, OnceLock, mpsc};
 
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::registration::{
-    CalibrationMap, CalibrationOptions, CalibrationRequest, HeadsetScan, PrepareOptions,
-    PreparedCloud, SemanticCloud, calibrate, voxel_downsample,
+    CalibrationMap, CalibrationOptions, CalibrationRequest, PrepareOptions, PreparedCloud,
+    SemanticCloud, SourceCloud, register_global, voxel_downsample,
 };
 use lattice_nodes::segmenter::{Segmenter, SegmenterOptions, read_network};
 use nalgebra::{Isometry3, Point3};
@@ -234,7 +234,7 @@ impl Chain<'_> {
             let image = rooms.take(&RoomCamera::HEADSET, &pose, image_seed);
             headset_scan(&image, &self.segmenter, &chunks, seen)
         });
-        let scans: Vec<Option<Both<HeadsetScan>>> = scans.collect::<Result<_, _>>()?;
+        let scans: Vec<Option<Both<SourceCloud>>> = scans.collect::<Result<_, _>>()?;
         let scans = scans.into_iter().flatten();
         let (found, right): (Vec<_>, Vec<_>) = scans.map(|s| (s.found, s.truth)).unzip();
         let (seen, seen_right) = (together(&found), together(&right));
@@ -243,7 +243,7 @@ impl Chain<'_> {
             headset: rounded(right_share(&seen, &seen_right)?),
         };
         let truth = trial.map_from_headset;
-        let bare = found.iter().map(|scan| HeadsetScan {
+        let bare = found.iter().map(|scan| SourceCloud {
             cloud: unlabelled(&scan.cloud),
             sensor_m: scan.sensor_m,
         });
@@ -257,12 +257,12 @@ impl Chain<'_> {
             (TRUE_LABELS, &place.map.truth, &right, &seen_right),
         ] {
             let request = CalibrationRequest {
-                headset_scans,
+                source_clouds: headset_scans,
                 start: None,
                 confusion: None,
             };
-            let found = calibrate(map, &request, &CalibrationOptions::default(), &());
-            let pose = &found.map_from_headset;
+            let found = register_global(map, &request, &CalibrationOptions::default(), &());
+            let pose = &found.target_from_source;
             // Times are taken beside other trials: they would say nothing.
             let trial = Trial::of_pose(&none, method, pose, &truth, &cloud.points_m, 0.0);
             trials.push(Trial {

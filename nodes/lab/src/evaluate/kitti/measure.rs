@@ -6,8 +6,8 @@ use crate::bench::timed;
 use crate::evaluate::trial::rounded;
 use crate::metrics::PoseError;
 use lattice_core::registration::{
-    CalibrationMap, CalibrationRequest, HeadsetScan, PrepareOptions, PreparedCloud, Profile,
-    SemanticCloud, calibrate, register, voxel_downsample,
+    CalibrationMap, CalibrationRequest, PrepareOptions, PreparedCloud, Profile, SemanticCloud,
+    SourceCloud, register, register_global, voxel_downsample,
 };
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde::Serialize;
@@ -170,22 +170,23 @@ impl Pair {
                     true => &source.thinned,
                     false => &source.whole,
                 };
-                let headset_scans = [HeadsetScan {
+                let headset_scans = [SourceCloud {
                     cloud: cloud.clone(),
                     sensor_m: Some(Point3::origin()),
                 }];
                 let request = CalibrationRequest {
-                    headset_scans: &headset_scans,
+                    source_clouds: &headset_scans,
                     start,
                     confusion: None,
                 };
                 let options = Profile::Lidar.options();
-                let (found, spent) = timed(|| calibrate(&target.map, &request, &options, &()));
+                let (found, spent) =
+                    timed(|| register_global(&target.map, &request, &options, &()));
                 PairRow {
                     register_ms: 1e3 * spent.cpu_s,
                     verdict: Some(found.verdict.name().to_owned()),
-                    margin: Some(rounded(found.margin.log)).filter(|m| m.is_finite()),
-                    ..row(&found.map_from_headset, target.map_ms)
+                    margin: Some(rounded(found.margin.log_ratio)).filter(|m| m.is_finite()),
+                    ..row(&found.target_from_source, target.map_ms)
                 }
             }
         })

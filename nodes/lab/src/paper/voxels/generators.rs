@@ -2,7 +2,7 @@
 
 use super::{Options, unit};
 use crate::AnyError;
-use crate::printed::printed_generator;
+use crate::paper_values::printed_generator;
 use crate::report::plot::title;
 use crate::report::{Cell, Check, Section, Table, Verdict};
 use lattice_core::lattice::LatticeKind;

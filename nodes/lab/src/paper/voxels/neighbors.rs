@@ -2,7 +2,7 @@
 
 use super::{Options, pairs, unit};
 use crate::AnyError;
-use crate::printed::printed_delta;
+use crate::paper_values::printed_delta;
 use crate::report::plot::title;
 use crate::report::{Cell, Check, Section, Table, Verdict};
 use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};

@@ -5,7 +5,7 @@ use crate::AnyError;
 use crate::evaluate::Share;
 use crate::paper::parallel::in_parallel;
 use crate::paper::streams::{Purpose, stream};
-use crate::printed::{PaperQuantizer, off_by_one, printed_delta};
+use crate::paper_values::{PaperQuantizer, off_by_one, printed_delta};
 use crate::report::plot::title;
 use crate::report::{Cell, Check, Section, Table, Verdict};
 use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};

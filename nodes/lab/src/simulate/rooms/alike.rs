@@ -1,6 +1,6 @@
-//! Rooms that look alike from several places: the traps of a calibration without a guess.
+//! Rooms that look alike from several places: adversarial scenes of a registration without a guess.
 
-use lattice_core::registration::{HeadsetScan, LabelDistribution, SemanticCloud};
+use lattice_core::registration::{LabelDistribution, SemanticCloud, SourceCloud};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::{FLOOR, Flat, WALL};
@@ -100,7 +100,7 @@ impl Flat {
         [x_m, y_m]: [f64; 2],
         map_from_headset: &Isometry3<f64>,
         uniform: &mut impl FnMut() -> f64,
-    ) -> HeadsetScan {
+    ) -> SourceCloud {
         let eye = Point3::new(x_m, y_m, EYE_M);
         let headset_from_map = map_from_headset.inverse();
         let mut cloud = SemanticCloud::default();
@@ -115,7 +115,7 @@ impl Flat {
                 }
             }
         }
-        HeadsetScan {
+        SourceCloud {
             cloud,
             sensor_m: Some(headset_from_map * eye),
         }

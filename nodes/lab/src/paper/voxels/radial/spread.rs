@@ -5,7 +5,7 @@ use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
 use crate::paper::voxels::sample::Samples;
 use crate::paper::voxels::unit;
-use crate::printed::printed_delta;
+use crate::paper_values::printed_delta;
 use crate::report::plot::{Curve, color, title};
 use crate::report::{Cell, numbers};
 use crate::theory::{mean_distance_m, second_moment};

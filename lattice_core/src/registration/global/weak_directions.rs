@@ -1,33 +1,39 @@
-//! Directions that surfaces leave weak, measured by moving the pose along them.
+//! Weak directions of a pose: optimization of the pose and its variance along them by the likelihood.
 
 use nalgebra::{Isometry3, Point3, RowVector6, Vector6};
 use rayon::prelude::*;
 
-use super::candidates::{Candidate, Workbench};
+use super::calibration::{DirectionKind, WeakDirection};
+use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::PoseCovariance;
-use super::judge::covariance;
 use super::margin::SOFTNESS;
-use super::types::{DirectionKind, WeakDirection};
+use super::verdict::covariance;
 use crate::pose::se3;
 
-/// Standard deviation beyond which a direction is weak, as a share of the largest that is accepted.
+/// Standard deviation above which a direction is weak, as a fraction of its limit.
 const WEAK: f64 = 0.25;
-/// Weak directions that are measured, at most.
+/// Maximum number of weak directions.
 const MEASURED: usize = 3;
-/// Part of a spacing that what is seen moves by in a turn: surfaces hold turns far better than motions.
-const TURN: f64 = 0.25;
-/// Steps by which what is seen is moved to measure a direction, at most.
-const REACH: u32 = 8;
-/// Odds of a step over none, at most.
-const LIKELIEST: f64 = 1e6;
-/// Steps by which it is moved to climb, at first and once more.
-const FAR: [f64; 5] = [8.0, 4.0, 2.0, 1.0, 0.5];
-const NEAR: [f64; 3] = [2.0, 1.0, 0.5];
+/// Displacement of the points in a rotation step, in spacings; surfaces constrain rotations better than translations.
+const ROTATION_STEP: f64 = 0.25;
+/// Number of steps to each side in the estimate of a variance.
+const STEPS: u32 = 8;
+/// Maximum odds of a step over none.
+const MAX_ODDS: f64 = 1e6;
+/// Step sizes of the line search, first pass.
+const LARGE_STEPS: [f64; 5] = [8.0, 4.0, 2.0, 1.0, 0.5];
+/// Step sizes of the line search, second pass.
+const SMALL_STEPS: [f64; 3] = [2.0, 1.0, 0.5];
 
-impl Workbench<'_> {
-    /// The covariance of a candidate's pose with what its likelihood says of the directions that surfaces and gravity
-    /// leave weak: the ends of a wall and its labels hold a pose along the wall.
-    pub fn probed(&self, candidate: &Candidate, surfaces: PoseCovariance) -> PoseCovariance {
+impl RegistrationContext<'_> {
+    /// Reduces the variance along weak directions to that of the likelihood.
+    ///
+    /// The ends of a wall and its labels constrain a pose along the wall, which its surface alone does not.
+    pub fn with_probed_variances(
+        &self,
+        candidate: &Candidate,
+        surfaces: PoseCovariance,
+    ) -> PoseCovariance {
         let weak = self.weak(candidate, &surfaces);
         weak.iter().fold(surfaces, |covariance, (weak, along)| {
             let variance = self.variance(candidate, weak.kind, along);
@@ -38,61 +44,61 @@ impl Workbench<'_> {
         })
     }
 
-    /// A candidate moved to where it is likeliest along the directions that surfaces and gravity leave weak, in which
-    /// registration goes astray.
-    pub fn climbed(&self, candidate: Candidate) -> Candidate {
+    /// Moves a candidate to the maximum of the likelihood along its weak directions, where registration drifts.
+    pub fn optimize_weak_directions(&self, candidate: Candidate) -> Candidate {
         let begin = candidate.total();
-        let far = self.climbed_by(candidate, &FAR);
+        let far = self.optimize_by(candidate, &LARGE_STEPS);
         match far.total() > begin {
-            // Other directions are weak there.
-            true => self.climbed_by(far, &NEAR),
+            // Other directions may be weak at the new pose.
+            true => self.optimize_by(far, &SMALL_STEPS),
             false => far,
         }
     }
 
-    fn climbed_by(&self, candidate: Candidate, steps: &[f64]) -> Candidate {
+    /// Line search along each weak direction with the given step sizes.
+    fn optimize_by(&self, candidate: Candidate, steps: &[f64]) -> Candidate {
         let Some(surfaces) = covariance(self, &candidate) else {
             return candidate;
         };
         let weak = self.weak(&candidate, &surfaces);
         weak.iter().fold(candidate, |best, (weak, along)| {
             let steps = steps.iter().map(|step| step * self.unit(weak.kind));
-            steps.fold(best, |best, step| self.likelier_of(best, along, step))
+            steps.fold(best, |best, step| self.best_of_steps(best, along, step))
         })
     }
 
-    /// The likeliest of a candidate and those a step to both sides.
-    fn likelier_of(&self, candidate: Candidate, along: &Direction, step: f64) -> Candidate {
+    /// The most likely of a candidate and its two neighbours at a step.
+    fn best_of_steps(&self, candidate: Candidate, along: &Direction, step: f64) -> Candidate {
         let sides = [step, -step].map(|step| self.moved(&candidate, along, step));
         let likelier = |a: Candidate, b: Candidate| if b.total() > a.total() { b } else { a };
         sides.into_iter().fold(candidate, likelier)
     }
 
-    /// The directions that surfaces and gravity leave weak, the weakest first of each kind.
+    /// Weak directions given surfaces and gravity, the weakest first of each kind.
     fn weak(
         &self,
         candidate: &Candidate,
         surfaces: &PoseCovariance,
     ) -> Vec<(WeakDirection, Direction)> {
-        let (pose, middle) = (&candidate.map_from_headset, self.middle());
+        let (pose, centroid) = (&candidate.target_from_source, self.centroid());
         let upright = surfaces.with_gravity(pose, self.options.gravity_sigma_rad);
         let held = upright.as_ref().unwrap_or(surfaces);
-        let mut weak = held.directions(pose, &middle);
+        let mut weak = held.directions(pose, &centroid);
         weak.retain(|d| d.sigma > WEAK * self.options.max_sigma(d.kind));
         weak.truncate(MEASURED);
-        let direction = |weak: WeakDirection| (weak, Direction::new(&weak, pose, &middle, held));
+        let direction = |weak: WeakDirection| (weak, Direction::new(&weak, pose, &centroid, held));
         weak.into_iter().map(direction).collect()
     }
 
     fn moved(&self, candidate: &Candidate, along: &Direction, step: f64) -> Candidate {
-        let moved = candidate.map_from_headset * se3::exp(&(along.motion * step));
-        self.judge(&self.fit, moved, candidate.method)
+        let moved = candidate.target_from_source * se3::exp(&(along.motion * step));
+        self.evaluate(&self.fit, moved, candidate.method)
     }
 
-    /// Variance of a direction about a pose, by the likelihoods of poses along it.
+    /// Variance along a direction about a pose, from the likelihoods of poses along it.
     fn variance(&self, candidate: &Candidate, kind: DirectionKind, along: &Direction) -> f64 {
         let unit = self.unit(kind);
-        let sides = (1..=REACH).flat_map(|i| [f64::from(i), -f64::from(i)]);
+        let sides = (1..=STEPS).flat_map(|i| [f64::from(i), -f64::from(i)]);
         let steps: Vec<f64> = sides.map(|step| step * unit).collect();
         let steps = steps.par_iter().map(|step| {
             let drop = candidate.total() - self.moved(candidate, along, *step).total();
@@ -101,33 +107,34 @@ impl Workbench<'_> {
         variance(unit, &steps.collect::<Vec<_>>())
     }
 
-    /// Step along a direction: a spacing of the map, or a turn by which what is seen moves by a part of that.
+    /// Step along a direction: one spacing of the map, or the rotation that moves the points by [`ROTATION_STEP`] of
+    /// it.
     fn unit(&self, kind: DirectionKind) -> f64 {
         match kind {
             DirectionKind::Translation => self.map.spacing_m,
-            DirectionKind::Rotation => TURN * self.map.spacing_m / self.reach_m(),
+            DirectionKind::Rotation => ROTATION_STEP * self.map.spacing_m / self.reach_m(),
         }
     }
 
-    /// Root mean square distance of the headset's points from their midst, metres.
+    /// RMS distance of the source points from their centroid, metres.
     pub fn reach_m(&self) -> f64 {
-        let (middle, points): (Point3<f64>, _) = (self.middle(), self.input.few.points_m());
-        let sum: f64 = points.iter().map(|p| (p - middle).norm_squared()).sum();
+        let (centroid, points): (Point3<f64>, _) = (self.centroid(), self.source.coarse.points_m());
+        let sum: f64 = points.iter().map(|p| (p - centroid).norm_squared()).sum();
         (sum / points.len().max(1) as f64)
             .sqrt()
             .max(self.map.spacing_m)
     }
 }
 
-/// Second moment about 0 of a direction, given how much less likely steps along it are than none, in logarithms of odds.
+/// Second moment about 0 along a direction, given the steps and their decrease of the log-odds.
 fn variance(unit: f64, steps: &[(f64, f64)]) -> f64 {
     let (mut all, mut moment) = (1.0, 0.0);
     let mut narrow = 0.0_f64;
     for (step, drop) in steps {
-        let likely = (-drop).exp().min(LIKELIEST);
+        let likely = (-drop).exp().min(MAX_ODDS);
         all += likely;
         moment += likely * step * step;
-        // A peak that lies between two steps is that of a normal distribution.
+        // A peak between two steps is approximated by a normal distribution.
         if step.abs() < 1.5 * unit {
             let peak = 0.5 * step * step / drop.max(f64::MIN_POSITIVE);
             narrow = narrow.max(peak.min(step * step));
@@ -136,12 +143,12 @@ fn variance(unit: f64, steps: &[(f64, f64)]) -> f64 {
     (moment / all).max(narrow)
 }
 
-/// A direction of the place of a source point, or of the orientation.
+/// Direction of a translation of the centroid or of a rotation.
 #[derive(Clone, Copy, Debug)]
 struct Direction {
-    /// Derivative of the place or the angle along it by a motion and a turn on the right of the pose.
+    /// Derivative of the translation or the angle along it by a right perturbation of the pose (rho, phi).
     lever: RowVector6<f64>,
-    /// Motion and turn that move the pose by a unit along it, and along all else as far as both go together.
+    /// Perturbation that moves the pose by one unit along it; correlated directions move too.
     motion: Vector6<f64>,
 }
 
@@ -172,8 +179,7 @@ impl Direction {
 }
 
 impl PoseCovariance {
-    /// With a measurement of how far the pose is off along a direction of the place of a source point or of the
-    /// orientation: its variance.
+    /// Kalman update with a measurement of variance `variance` along a direction.
     fn measured(&self, direction: &Direction, variance: f64) -> PoseCovariance {
         let along = self.at_source * direction.lever.transpose();
         let spread = (direction.lever * along)[0] + variance;
@@ -187,8 +193,8 @@ impl PoseCovariance {
 #[cfg(test)]
 mod tests {
     use super::super::CalibrationMap;
-    use super::super::input::Input;
-    use super::super::types::{CalibrationOptions, CalibrationRequest, HeadsetScan};
+    use super::super::request::{CalibrationOptions, CalibrationRequest, SourceCloud};
+    use super::super::source::PreparedSource;
     use super::*;
     use crate::registration::SemanticCloud;
     use nalgebra::{Matrix6, Vector3};
@@ -196,17 +202,17 @@ mod tests {
     #[test]
     fn a_measurement_tells_the_direction_that_was_weak() {
         let pose = Isometry3::new(Vector3::new(1.0, 2.0, 0.0), Vector3::z());
-        let middle = Point3::new(2.0, 0.5, 0.0);
+        let centroid = Point3::new(2.0, 0.5, 0.0);
         let loose = PoseCovariance {
             at_source: Matrix6::identity() * 1e-4
                 + Matrix6::from_diagonal(&Vector6::new(0.0, 4.0, 0.0, 0.0, 0.0, 0.0)),
         };
-        let weak = loose.directions(&pose, &middle)[0];
+        let weak = loose.directions(&pose, &centroid)[0];
         assert!((weak.sigma - 2.0).abs() < 1e-3);
-        let direction = Direction::new(&weak, &pose, &middle, &loose);
+        let direction = Direction::new(&weak, &pose, &centroid, &loose);
         assert!(((direction.lever * direction.motion)[0] - 1.0).abs() < 1e-9);
         let told = loose.measured(&direction, 0.01 * 0.01);
-        let after = told.directions(&pose, &middle);
+        let after = told.directions(&pose, &centroid);
         assert!(after[0].sigma < 0.03);
     }
 
@@ -214,7 +220,7 @@ mod tests {
     fn a_peak_has_the_variance_of_a_normal_distribution_and_a_valley_beside_it_widens_it() {
         let unit = 0.05;
         let steps = |drop: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
-            let sides = (1..=REACH).flat_map(|i| [f64::from(i), -f64::from(i)]);
+            let sides = (1..=STEPS).flat_map(|i| [f64::from(i), -f64::from(i)]);
             sides.map(|i| (i * unit, drop(i * unit))).collect()
         };
         for sigma in [0.01, 0.03, 0.05, 0.1] {
@@ -247,25 +253,25 @@ mod tests {
     fn a_pose_that_slid_along_a_wall_climbs_back() {
         let map = CalibrationMap::new(wall(2.4, 1.4), 0.05).unwrap();
         let options = CalibrationOptions::default();
-        let scan = HeadsetScan {
+        let scan = SourceCloud {
             cloud: wall(1.4, 0.9),
             sensor_m: Some(Point3::origin()),
         };
         let request = CalibrationRequest {
-            headset_scans: &[scan],
+            source_clouds: &[scan],
             start: None,
             confusion: None,
         };
-        let input = Input::new(&request, &options, 0.05).unwrap();
-        let bench = Workbench::new(&map, &input, &options, None);
-        let off_m = |candidate: &Candidate| candidate.map_from_headset.translation.vector.norm();
+        let source = PreparedSource::new(&request, &options, 0.05).unwrap();
+        let context = RegistrationContext::new(&map, &source, &options, None);
+        let off_m = |candidate: &Candidate| candidate.target_from_source.translation.vector.norm();
         for slide in [Vector3::y() * 0.3, Vector3::y() * -0.45, Vector3::z() * 0.2] {
-            let slid = bench.judge(
-                &bench.fit,
+            let slid = context.evaluate(
+                &context.fit,
                 Isometry3::new(slide, Vector3::zeros()),
                 "search",
             );
-            let back = bench.climbed(slid.clone());
+            let back = context.optimize_weak_directions(slid.clone());
             assert!(
                 back.total() > slid.total() && off_m(&back) < 0.05,
                 "{slide}: {}",

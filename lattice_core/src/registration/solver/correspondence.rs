@@ -1,9 +1,11 @@
-//! A pair of points and its Mahalanobis distance.
+//! Correspondence of two points and its Mahalanobis distance.
 //!
-//! All is in the axes of the target: q = T x, z = R (x - c), r = y - q, m = R n_s, where c is the centre of the source.
+//! All vectors are along the axes of the target: q = T x, z = R (x - c), r = y - q, m = R n_s, where c is the centre
+//! of the source.
 
 use nalgebra::{Point3, Vector3};
 
+/// Metric of the residual.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Metric {
     /// |r|^2.
@@ -12,7 +14,7 @@ pub(super) enum Metric {
     Planes { target: f64, source: f64 },
 }
 
-/// Inverse covariance of a pair: base I + a_weight a a^T + m_weight m m^T.
+/// Information matrix of a correspondence: base I + a_weight a a^T + m_weight m m^T.
 pub(super) struct Information {
     pub base: f64,
     pub a: Vector3<f64>,
@@ -23,7 +25,7 @@ pub(super) struct Information {
 }
 
 impl Metric {
-    /// Inverse of 2 I - t n n^T - s m m^T by Woodbury's identity: only a 2 x 2 matrix is inverted.
+    /// Inverse of 2 I - t n n^T - s m m^T by Woodbury's identity, which inverts only a 2 x 2 matrix.
     #[inline(always)]
     pub fn information(self, n: &Vector3<f64>, m: &Vector3<f64>) -> Information {
         match self {
@@ -50,14 +52,14 @@ impl Metric {
     }
 
     /// Determinant of the covariance of two parallel planes, m^6.
-    pub fn least_determinant(self) -> f64 {
+    pub fn min_determinant(self) -> f64 {
         let axis = Vector3::z();
         self.information(&axis, &axis).determinant
     }
 }
 
-/// A pair in the axes of the target.
-pub(super) struct Pair {
+/// Correspondence along the axes of the target.
+pub(super) struct Correspondence {
     /// Target point minus transformed source point, m.
     pub r: Vector3<f64>,
     /// Rotated source point, from the centre of the source, m.
@@ -67,17 +69,17 @@ pub(super) struct Pair {
     pub information: Information,
 }
 
-impl Pair {
-    /// Pair of a source point that the pose takes to `q`, and target point `y`; the pose takes the centre of the source
-    /// to `center`.
+impl Correspondence {
+    /// Correspondence of a source point, transformed to `q` with normal `m`, and a target point `y` with normal `n`;
+    /// `center` is the transformed centre of the source.
     #[inline(always)]
     pub fn new(
         metric: Metric,
         center: &Vector3<f64>,
         (q, m): (&Point3<f64>, &Vector3<f64>),
         (y, n): (&Point3<f64>, &Vector3<f64>),
-    ) -> Pair {
-        Pair {
+    ) -> Correspondence {
+        Correspondence {
             r: y - q,
             z: q.coords - center,
             m: *m,
@@ -87,7 +89,7 @@ impl Pair {
 
     /// M r, 1/m.
     #[inline(always)]
-    pub fn pull(&self) -> Vector3<f64> {
+    pub fn gradient(&self) -> Vector3<f64> {
         let i = &self.information;
         let along_a = i.a_weight * i.a.dot(&self.r);
         let along_m = i.m_weight * self.m.dot(&self.r);

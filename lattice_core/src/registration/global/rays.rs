@@ -1,20 +1,20 @@
-//! Lines of sight of a headset: a right pose does not look through walls.
+//! Lines of sight of a sensor: at a correct pose they pass through free space.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::super::PreparedCloud;
 use super::super::search::OccupiedGrid;
 
-/// Rays that are looked at, at most.
+/// Maximum number of sampled rays.
 const RAYS: usize = 300;
-/// Places of a ray that are looked at, at most, however far a point claims to be.
+/// Maximum number of samples along a ray.
 const STEPS: usize = 1000;
-/// Distance between them, in cells.
+/// Distance between samples, in cells.
 const STRIDE: f64 = 0.7;
 
-/// Share of the rays to the points that go through a surface on their way.
+/// Fraction of the rays to the points that pass through a surface.
 ///
-/// The way ends before the point by `clear_m`, and begins as far after the sensor.
+/// The first and last `clear_m` of each ray are ignored.
 pub(super) fn blocked_fraction(
     occupied: &OccupiedGrid,
     source: &PreparedCloud,
@@ -40,14 +40,14 @@ pub(super) fn blocked_fraction(
     f64::from(blocked) / f64::from(rays.max(1))
 }
 
-/// Distance at which a ray goes through a surface, within a part of its way, metres.
+/// Distance at which a ray passes through a surface within `way_m`, metres.
 pub(super) fn crossing_m(
     occupied: &OccupiedGrid,
     from_m: &Point3<f64>,
     direction: &Vector3<f64>,
     way_m: std::ops::Range<f64>,
 ) -> Option<f64> {
-    // Less than a cell, so that none is passed over but at its corners.
+    // Less than a cell, so that a ray skips cells only at their corners.
     let stride = STRIDE * occupied.cell_m();
     let steps = ((way_m.end - way_m.start) / stride) as usize;
     (0..=steps.min(STEPS)).find_map(|i| {

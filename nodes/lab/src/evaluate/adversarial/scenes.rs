@@ -1,16 +1,16 @@
-//! Traps: rooms that look alike from several places, and clouds that are not what they are said to be.
+//! Adversarial scenes: rooms that look alike from several places, and misdeclared clouds.
 
-use crate::evaluate::looks::{any_pose, keep_sector, signed};
+use crate::evaluate::views::{any_pose, keep_sector, signed};
 use crate::random::Stream;
 use crate::simulate::rooms::{Flat, LOOKS};
 use lattice_core::pose::Axes;
-use lattice_core::registration::{CalibrationOptions, HeadsetScan, SemanticCloud};
+use lattice_core::registration::{CalibrationOptions, SemanticCloud, SourceCloud};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 /// A map and a scan, with the truth.
 pub(super) struct Scene {
     pub map: SemanticCloud,
-    pub scan: HeadsetScan,
+    pub scan: SourceCloud,
     pub options: CalibrationOptions,
     pub truth: Isometry3<f64>,
 }
@@ -78,7 +78,7 @@ pub(super) enum Fault {
     Tilt(f64),
     /// One axis has the wrong sign.
     Mirrored,
-    /// It was taken in another building.
+    /// Taken in another building.
     Elsewhere,
 }
 
@@ -105,7 +105,7 @@ impl Fault {
         }
     }
 
-    /// True if the reason of an answer names this fault.
+    /// Tests whether the reason of a result names this fault.
     pub fn is_named_by(self, reason: &str) -> bool {
         let any = |parts: &[&str]| parts.iter().any(|part| reason.contains(part));
         match self {
@@ -117,7 +117,7 @@ impl Fault {
         }
     }
 
-    /// A look into the flat with this fault.
+    /// View into the flat with this fault.
     pub fn scene(self, seed: u64, random: &mut Stream) -> Scene {
         let flat = Flat::default();
         let truth = any_pose(random);
@@ -146,7 +146,7 @@ impl Fault {
             Fault::Mirrored => Vector3::new(p.x, -p.y, p.z),
             Fault::Elsewhere => p,
         };
-        let mut scan = HeadsetScan {
+        let mut scan = SourceCloud {
             cloud,
             sensor_m: Some(truth.inverse() * eye),
         };
@@ -184,7 +184,7 @@ pub(super) enum Object {
     None,
     /// A box as large as a chair.
     Box,
-    /// A cube of 20 to 60 cm, which may be too little to tell.
+    /// A cube of 20 to 60 cm, possibly too small to break the symmetry.
     Cube,
 }
 
@@ -240,8 +240,9 @@ impl Look {
     }
 }
 
-/// A scan all around in a small room, empty or with a cube somewhere, which may be too little to tell from where; its
-/// axes are trusted, so that thousands are calibrated in an hour.
+/// Panoramic scan in a small room, empty or with a cube that may be too small to break the symmetry.
+///
+/// Its axes are trusted, so that thousands are registered in an hour.
 pub(super) fn small_room(object: Object, random: &mut Stream) -> Scene {
     let truth = any_pose(random);
     let sides = [(); 2].map(|()| 2.0 + 2.0 * random.uniform());

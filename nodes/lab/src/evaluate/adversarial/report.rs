@@ -1,15 +1,15 @@
-//! The report of the traps.
+//! Report of the adversarial scenes.
 
 use super::scenes::Fault;
 use super::{ALIKE, BROKEN, NEARLY, WRONG_INPUT};
 use crate::evaluate::trial::{Trial, WRONG};
 use crate::report::{Cell, Report, Section, Table};
 
-/// Wrong answers that are listed.
+/// Maximum number of listed wrong answers.
 const LISTED: usize = 40;
 
-/// A table for each kind of trap, and the answers that were called OK and are wrong.
-pub fn traps_report(trials: &[Trial]) -> Report {
+/// Creates a table for each kind of scene, and lists the false accepts.
+pub fn adversarial_report(trials: &[Trial]) -> Report {
     let lead = format!(
         "{} calibrations without a start that must not be certain of a wrong pose: beyond {} m or {} degrees. \
          docs/dev/calibration.md says how the scenes are made.",

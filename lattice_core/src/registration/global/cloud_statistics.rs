@@ -1,31 +1,30 @@
-//! Range, density and noise of clouds, by which the sensor that made them is told.
+//! Range, density and noise of clouds, which identify the kind of sensor.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use rustc_hash::FxHashMap;
 
 use super::super::likelihood::quantile;
-use super::types::HeadsetScan;
+use super::request::SourceCloud;
 
-/// Points that are looked at, at most; of more, some.
+/// Maximum number of sampled points.
 const POINTS: usize = 200_000;
-/// Side of the cells that points are counted in, metres.
+/// Side of the counting cells, metres.
 const CELL_M: f64 = 0.1;
-/// Fewest points of a cell that a plane is fitted to.
-const LEAST: f64 = 12.0;
-/// Share of the cells that are within the range.
+/// Minimum number of points in a cell for a plane fit.
+const MIN_PLANE_POINTS: f64 = 12.0;
+/// Quantile of the cell distances that defines the range.
 const WITHIN: f64 = 0.9;
-/// Farthest that a point may be, metres.
+/// Maximum coordinate of a point, metres.
 const FARTHEST_M: f64 = 1e6;
 
 /// Range, density and noise of clouds.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(super) struct CloudStatistics {
-    /// Distance from the sensor, or from the midst of the points, within which nine of ten surfaces are, metres.
+    /// Distance from the sensor, or from the centroid, that contains 90 % of the surfaces, metres.
     pub range_m: f64,
-    /// Points of a cell of 10 cm, in the median.
+    /// Median number of points per cell of 10 cm.
     pub points_of_cell: f64,
-    /// Distance of points from the plane through those of their cell, root mean square, metres, in the median; 0 if
-    /// there are too few.
+    /// Median RMS distance of points from the plane of their cell, metres; 0 if there are too few points.
     pub noise_m: f64,
 }
 
@@ -38,8 +37,8 @@ struct Cell {
 }
 
 impl CloudStatistics {
-    /// Of clouds, each seen from its own sensor.
-    pub fn of(scans: &[HeadsetScan]) -> CloudStatistics {
+    /// Computes the statistics of clouds, each seen from its own sensor.
+    pub fn of(scans: &[SourceCloud]) -> CloudStatistics {
         let all: usize = scans.iter().map(|scan| scan.cloud.len()).sum();
         let stride = all.div_ceil(POINTS).max(1);
         let (mut distances_m, mut counts, mut noises_m) = (Vec::new(), Vec::new(), Vec::new());
@@ -58,12 +57,13 @@ impl CloudStatistics {
     }
 }
 
-fn cells(scan: &HeadsetScan, stride: usize) -> Vec<Cell> {
+/// Sampled points of a cloud, summed by cell.
+fn cells(scan: &SourceCloud, stride: usize) -> Vec<Cell> {
     let usable = |p: &&Point3<f64>| p.iter().all(|c| c.abs() <= FARTHEST_M);
     let points = || scan.cloud.points_m.iter().step_by(stride).filter(usable);
     let sum = points().fold(Vector3::zeros(), |sum, p| sum + p.coords);
-    let middle = Point3::from(sum / (points().count().max(1)) as f64);
-    let from = scan.sensor_m.unwrap_or(middle);
+    let centroid = Point3::from(sum / (points().count().max(1)) as f64);
+    let from = scan.sensor_m.unwrap_or(centroid);
     let mut cells: FxHashMap<[i32; 3], Cell> = FxHashMap::default();
     for point in points() {
         let key = [point.x, point.y, point.z].map(|c| (c / CELL_M).floor() as i32);
@@ -71,7 +71,7 @@ fn cells(scan: &HeadsetScan, stride: usize) -> Vec<Cell> {
             distance_m: nalgebra::distance(point, &from),
             ..Cell::default()
         });
-        // From a corner of the cell: squares of large coordinates lose their digits.
+        // Coordinates relative to the cell's corner: squares of large coordinates lose digits.
         let place = point.coords - Vector3::from(key.map(|c| f64::from(c) * CELL_M));
         cell.points += 1.0;
         cell.sum_m += place;
@@ -81,12 +81,13 @@ fn cells(scan: &HeadsetScan, stride: usize) -> Vec<Cell> {
 }
 
 impl Cell {
+    /// RMS distance of the points from their plane; `None` if there are too few.
     fn noise_m(&self) -> Option<f64> {
-        if self.points < LEAST {
+        if self.points < MIN_PLANE_POINTS {
             return None;
         }
-        let middle = self.sum_m / self.points;
-        let spread = self.squares / self.points - middle * middle.transpose();
+        let centroid = self.sum_m / self.points;
+        let spread = self.squares / self.points - centroid * centroid.transpose();
         Some(spread.symmetric_eigenvalues().min().max(0.0).sqrt())
     }
 }
@@ -97,7 +98,7 @@ mod tests {
     use crate::registration::SemanticCloud;
 
     /// A floor of 2 m by 2 m below a sensor, a point each centimetre, every other moved up by `noise_m`.
-    fn floor(noise_m: f64) -> HeadsetScan {
+    fn floor(noise_m: f64) -> SourceCloud {
         let places = (0..200).flat_map(|x| (0..200).map(move |y| (x, y)));
         let point = |(x, y): (i32, i32)| {
             let up_m = noise_m * f64::from((x + y) % 2);
@@ -107,7 +108,7 @@ mod tests {
                 up_m + 0.05,
             )
         };
-        HeadsetScan {
+        SourceCloud {
             cloud: SemanticCloud::unlabelled(places.map(point).collect()),
             sensor_m: Some(Point3::new(0.0, 0.0, 1.5)),
         }

@@ -1,26 +1,31 @@
-//! A map prepared for calibrations.
+//! Target map, prepared for global registration.
 
 use super::super::confusion::shares;
 use super::super::likelihood::FitScale;
 use super::super::search::{OccupiedGrid, SearchMap};
 use super::super::{PrepareOptions, PreparedCloud, RegistrationError, SemanticCloud};
 
-/// A map with all that a calibration looks up in it; made once, shared by all calibrations.
+/// Target map with its search structures; prepared once, shared by all registrations.
 pub struct CalibrationMap {
+    /// Voxel centroids with normals.
     pub(super) cloud: PreparedCloud,
+    /// Search grid by surfaces.
     pub(super) surfaces: SearchMap,
-    /// The same with cells twice as large, for a look at readings that are hardly right.
+    /// Search grid with cells twice as large, for the rough search.
     pub(super) rough: SearchMap,
+    /// Occupied cells, for lines of sight.
     pub(super) occupied: OccupiedGrid,
+    /// Spacing of the points: the cell size, metres.
     pub(super) spacing_m: f64,
+    /// Fractions of the label classes.
     pub(super) classes: Vec<(u16, f64)>,
 }
 
 impl CalibrationMap {
-    /// Prepares the centroids of a map's voxels, labelled or not, given the side of a cube as large as a voxel.
+    /// Prepares the voxel centroids of a map, labelled or not, given its cell size.
     ///
     /// # Errors
-    /// If there are too few points, some are not finite, or the side is not a length.
+    /// Fails if the cell size is not positive, there are too few points, or a point is not finite.
     pub fn new(
         cloud: SemanticCloud,
         cell_side_m: f64,
@@ -48,12 +53,12 @@ impl CalibrationMap {
         })
     }
 
-    /// The points of the map.
+    /// Points of the map.
     pub fn cloud(&self) -> &PreparedCloud {
         &self.cloud
     }
 
-    /// Expected deviation of points from this map, with noise of their own.
+    /// Expected residuals of points with noise `noise_m` against this map.
     pub(super) fn scale(&self, noise_m: f64) -> FitScale {
         FitScale::new(self.spacing_m, noise_m)
     }

@@ -1,11 +1,11 @@
-//! Random poses of looks, and parts of them.
+//! Random poses of views, and sectors of them.
 
-use lattice_core::registration::HeadsetScan;
+use lattice_core::registration::SourceCloud;
 use nalgebra::{Isometry3, Vector3};
 
 use crate::random::Stream;
 
-/// A pose without a lean, a few metres off.
+/// Random upright pose within a few metres.
 pub fn any_pose(random: &mut Stream) -> Isometry3<f64> {
     let place = Vector3::new(3.0 * signed(random), 3.0 * signed(random), 1.5);
     Isometry3::new(place, Vector3::z() * std::f64::consts::PI * signed(random))
@@ -17,7 +17,7 @@ pub fn signed(random: &mut Stream) -> f64 {
 }
 
 /// Keeps the points within `half_rad` of a random heading.
-pub fn keep_sector(scan: &mut HeadsetScan, half_rad: f64, random: &mut Stream) {
+pub fn keep_sector(scan: &mut SourceCloud, half_rad: f64, random: &mut Stream) {
     let Some(eye) = scan.sensor_m else { return };
     let turn = std::f64::consts::PI * signed(random);
     let heading = Vector3::new(turn.cos(), turn.sin(), 0.0);

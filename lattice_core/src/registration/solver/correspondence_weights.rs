@@ -1,23 +1,23 @@
-//! Weights of candidate pairs by the labels and the distance of their points.
+//! Weights of candidate correspondences by the labels and the distance of their points.
 
 use nalgebra::{Point3, Vector3};
 
-use super::pairs::{Layer, NONE, Pairs, Placed, Slot};
+use super::correspondences::{Correspondences, Layer, NONE, Placed, Slot};
 use crate::registration::{
     LabelDistribution, LabelUse, Method, PreparedCloud, RegisterOptions, SemanticVariant,
 };
 
-/// Squared Mahalanobis distance at which a pair is as likely an outlier.
+/// Squared Mahalanobis distance at which inlier and outlier are equally likely.
 const OUTLIER_SQUARED: f64 = 9.0;
 
-/// Labels of both clouds, by place in the order of the tree.
+/// Labels of both clouds, in the order of the trees.
 pub(super) struct Labels<'a> {
     pub source: &'a [LabelDistribution],
     pub target: &'a [LabelDistribution],
 }
 
-impl Pairs<'_> {
-    /// Weighs the candidates of a source point; those that do not count stay without a pair.
+impl Correspondences<'_> {
+    /// Weights the candidates of a source point; those of weight zero are removed.
     pub(super) fn weigh(
         &self,
         variant: SemanticVariant,
@@ -27,7 +27,7 @@ impl Pairs<'_> {
         slots: &mut [Slot],
     ) {
         let source = label_at(self.labels.source, i);
-        let (mut total, least) = (0.0, self.metric.least_determinant());
+        let (mut total, least) = (0.0, self.metric.min_determinant());
         for slot in slots.iter_mut().filter(|slot| slot.target != NONE) {
             let target = label_at(self.labels.target, slot.target as usize);
             let agreement = self.agreement(variant, &source, &target);
@@ -55,7 +55,7 @@ impl Pairs<'_> {
         }
     }
 
-    /// Likelihood that two points are of one class (seed eq. 5, in brackets), or the weight in its place.
+    /// Probability that two points have the same class (seed eq. 5, in brackets), or its replacement `pair_weight`.
     fn agreement(
         &self,
         variant: SemanticVariant,
@@ -75,7 +75,7 @@ impl Pairs<'_> {
         if variant != SemanticVariant::Em {
             return equal;
         }
-        // Unknown labels agree with anything.
+        // Unknown labels agree with all classes.
         let unknown = |l: &LabelDistribution| match self.options.labels {
             LabelUse::Hard => f64::from(u8::from(l.top().is_none())),
             LabelUse::Soft => f64::from(l.unknown()),
@@ -85,7 +85,7 @@ impl Pairs<'_> {
     }
 }
 
-/// Sum over classes of the products of probabilities.
+/// Probability that two independent labels are equal.
 fn overlap(source: &LabelDistribution, target: &LabelDistribution) -> f64 {
     let mut sum = 0.0;
     for (s, p) in source.iter() {
@@ -102,6 +102,7 @@ fn label_at(labels: &[LabelDistribution], i: usize) -> LabelDistribution {
     labels.get(i).copied().unwrap_or(LabelDistribution::UNKNOWN)
 }
 
+/// Labels that a method uses.
 pub(super) fn labels<'a>(
     source: &'a PreparedCloud,
     target: &'a PreparedCloud,

@@ -1,12 +1,12 @@
-//! Calibrations that must not be called certain: rooms that look alike from several places, and clouds in
-//! wrong axes, of a wrong scale, leaning, or of another building.
+//! Adversarial scenes, which must not yield a confident wrong pose: rooms that look alike from several places, and
+//! clouds with wrong axes, a wrong scale, a tilt, or of another building.
 
 mod report;
 mod scenes;
 
-pub use report::traps_report;
+pub use report::adversarial_report;
 
-use lattice_core::registration::{CalibrationMap, CalibrationRequest, calibrate};
+use lattice_core::registration::{CalibrationMap, CalibrationRequest, register_global};
 
 use super::many::Case;
 use super::settings::Cell;
@@ -15,9 +15,9 @@ use crate::AnyError;
 use crate::random::Stream;
 use scenes::{Fault, Look, Object, Scene, small_room};
 
-/// A trap.
+/// Adversarial scene.
 #[derive(Clone, Copy, Debug)]
-pub struct Trap(Kind);
+pub struct AdversarialScene(Kind);
 
 #[derive(Clone, Copy, Debug)]
 enum Kind {
@@ -26,22 +26,22 @@ enum Kind {
     Fault(Fault),
 }
 
-/// Kinds of traps, the first part of a scene's name.
+/// Kinds of adversarial scenes, the first part of a scene's name.
 const ALIKE: &str = "alike";
 const BROKEN: &str = "broken";
 const NEARLY: &str = "nearly alike";
 const WRONG_INPUT: &str = "wrong input";
 
-impl Trap {
-    /// Side of the cells of the maps, metres.
+impl AdversarialScene {
+    /// Cell size of the maps, metres.
     pub const CELL_SIDE_M: f64 = 0.05;
 
-    /// All traps.
-    pub fn all() -> Vec<Trap> {
+    /// All adversarial scenes.
+    pub fn all() -> Vec<AdversarialScene> {
         let faults = Fault::all().into_iter().map(Kind::Fault);
         let all = faults.chain(Look::all().into_iter().map(Kind::Alike));
         all.chain([Object::None, Object::Cube].map(Kind::SmallRoom))
-            .map(Trap)
+            .map(AdversarialScene)
             .collect()
     }
 }
@@ -55,7 +55,7 @@ fn kind_of(object: Object) -> &'static str {
     }
 }
 
-impl Case for Trap {
+impl Case for AdversarialScene {
     fn name(&self) -> String {
         match self.0 {
             Kind::Fault(fault) => format!("{WRONG_INPUT}/{}", fault.name()),
@@ -82,13 +82,13 @@ impl Case for Trap {
         let map = CalibrationMap::new(map, Self::CELL_SIDE_M)?;
         let seen_m = scan.cloud.points_m.clone();
         let request = CalibrationRequest {
-            headset_scans: &[scan],
+            source_clouds: &[scan],
             start: None,
             confusion: None,
         };
-        let found = calibrate(&map, &request, &options, &());
+        let found = register_global(&map, &request, &options, &());
         // Times are taken beside other trials: they would say nothing.
-        let trial = Trial::of_pose(cell, OURS, &found.map_from_headset, &truth, &seen_m, 0.0);
+        let trial = Trial::of_pose(cell, OURS, &found.target_from_source, &truth, &seen_m, 0.0);
         Ok(trial.with_judgement(&found, &truth))
     }
 }
@@ -114,8 +114,8 @@ mod tests {
             (Fault::Scale(0.9), 19),
         ];
         for (fault, seed) in faults {
-            let trap = Trap(Kind::Fault(fault));
-            let trial = trap.run(&trap.cell(seed)).unwrap();
+            let scene = AdversarialScene(Kind::Fault(fault));
+            let trial = scene.run(&scene.cell(seed)).unwrap();
             let reason = &trial.judged.as_ref().unwrap().reason;
             assert!(!trial.is_accepted(), "{fault:?}: {reason}");
             assert!(fault.is_named_by(reason), "{fault:?}: {reason}");
@@ -123,15 +123,18 @@ mod tests {
     }
 
     #[test]
-    fn a_trap_is_the_same_each_time_and_its_reason_is_told() {
-        let trap = Trap(Kind::Fault(Fault::Scale(1.25)));
-        let cell = trap.cell(0);
-        let trial = trap.run(&cell).unwrap();
-        assert_eq!(trial, trap.run(&cell).unwrap());
+    fn an_adversarial_scene_is_reproducible() {
+        let scene = AdversarialScene(Kind::Fault(Fault::Scale(1.25)));
+        let cell = scene.cell(0);
+        let trial = scene.run(&cell).unwrap();
+        assert_eq!(trial, scene.run(&cell).unwrap());
         assert!(!trial.is_accepted());
-        let mut names: Vec<String> = Trap::all().iter().map(Trap::name).collect();
+        let mut names: Vec<String> = AdversarialScene::all()
+            .iter()
+            .map(AdversarialScene::name)
+            .collect();
         names.sort();
         names.dedup();
-        assert_eq!(names.len(), Trap::all().len());
+        assert_eq!(names.len(), AdversarialScene::all().len());
     }
 }

@@ -1,30 +1,31 @@
-//! Options of a registration: method, kernel, labels, and when to stop.
+//! Options of a registration: method, robust kernel, labels and termination.
 
 use super::Lift;
 
-/// Cost that a registration minimises.
+/// Cost that a registration minimizes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Method {
     /// Squared distance to the nearest point (Besl and McKay 1992).
     PointToPoint,
     /// Mahalanobis distance to the nearest point (Segal et al. 2009).
     Gicp,
-    /// The same under a Cauchy kernel, on SE(3) (Nakamura et al. 2019, eq. 3).
+    /// Mahalanobis distance to the nearest point under a Cauchy kernel, on SE(3) (Nakamura et al. 2019, eq. 3).
     GicpSe3,
-    /// Several near points, weighed by their labels (Nakamura et al. 2019, eqs. 5 to 8).
+    /// Mahalanobis distances to several near points, weighted by their labels (Nakamura et al. 2019, eqs. 5 to 8).
     Semantic(SemanticVariant),
-    /// The nearest point of the same class, with trees and covariances of each class (Semantic-ICP of 2017).
+    /// Mahalanobis distance to the nearest point of the same class, with a tree and covariances per class
+    /// (Semantic-ICP of 2017).
     ClassWise,
 }
 
 /// Variant of Semantic-ICP.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SemanticVariant {
-    /// As printed: density times label likelihood, not normalised, inside the kernel.
+    /// As printed in the paper: density times label likelihood, not normalized, inside the kernel.
     AsPrinted,
-    /// As the authors' program runs: label likelihood alone, not normalised, outside the kernel.
+    /// As in the authors' code: label likelihood alone, not normalized, outside the kernel.
     Published,
-    /// Responsibilities, normalised over the candidates and an outlier class.
+    /// EM responsibilities, normalized over the candidates and an outlier class.
     Em,
 }
 
@@ -33,49 +34,48 @@ pub enum SemanticVariant {
 pub enum LabelUse {
     /// The most probable class of each point.
     Hard,
-    /// The distribution of each point; for [`SemanticVariant::Published`] the shares of the most
-    /// probable classes of the nearest 20 points of its own cloud.
+    /// The distribution of each point; for [`SemanticVariant::Published`] the fractions of the most probable classes
+    /// of the nearest 20 points of its own cloud.
     Soft,
 }
 
 /// Options of a registration.
 ///
-/// Tolerances are for the step of one iteration; both must hold.
+/// Both tolerances must hold for the step of one iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct RegisterOptions<'a> {
     /// Method: the cost that is minimised.
     pub method: Method,
-    /// Longest distance between the points of a pair, metres.
+    /// Maximum distance of a correspondence (gate), metres.
     pub gate_m: f64,
-    /// Candidates of each source point, at most [`MAX_CANDIDATES`]; one but for [`Method::Semantic`].
+    /// Candidate correspondences per source point, at most [`MAX_CANDIDATES`]; one except for [`Method::Semantic`].
     pub neighbors: usize,
-    /// Scale of the Cauchy kernel in Mahalanobis distances; infinite for none.
+    /// Scale of the Cauchy kernel in Mahalanobis distances; `INFINITY` for no kernel.
     pub cauchy_alpha: f64,
-    /// Most searches for pairs.
+    /// Maximum number of correspondence searches.
     pub max_iterations: usize,
-    /// Most steps between two searches.
+    /// Maximum number of optimizer steps per search.
     pub inner_iterations: usize,
-    /// Rotation below which a step is none, radians.
+    /// Rotation of a step below which the registration has converged, radians.
     pub rotation_tolerance_rad: f64,
-    /// Translation below which a step is none, metres.
+    /// Translation of a step below which the registration has converged, metres.
     pub translation_tolerance_m: f64,
-    /// Every how manieth source point is used; in the order of the tree, so spread evenly.
+    /// Stride over the source points, in the order of the tree, which samples them evenly.
     pub source_stride: usize,
     /// Hard or soft labels.
     pub labels: LabelUse,
-    /// Weight of a pair by its labels in place of their equality, for [`Method::Semantic`].
+    /// Weight of a correspondence by its labels, instead of their equality, for [`Method::Semantic`].
     pub pair_weight: Option<&'a Lift>,
-    /// Factor a search on the variances, from a third of the gate across planes down to the true ones, for
-    /// [`SemanticVariant::Em`]; 1 or more for none.
+    /// Annealing factor of the variances per search, from a third of the gate across planes down to the true ones,
+    /// for [`SemanticVariant::Em`]; 1 or more disables it.
     pub anneal: f64,
-    /// True if the kernel of [`Method::ClassWise`] takes the square of the squared distance, as the program
-    /// of 2017 does.
+    /// Applies the kernel of [`Method::ClassWise`] to the square of the squared distance, as the code of 2017 does.
     pub kernel_of_square: bool,
-    /// Fewest source points of a class for [`Method::ClassWise`].
+    /// Minimum number of source points per class for [`Method::ClassWise`].
     pub min_class_points: usize,
 }
 
-/// Most candidates of a source point.
+/// Maximum number of candidate correspondences per source point.
 pub const MAX_CANDIDATES: usize = 16;
 
 impl RegisterOptions<'_> {
@@ -88,7 +88,7 @@ impl RegisterOptions<'_> {
         }
     }
 
-    /// GICP as small_gicp 1.0.1 runs it: 20 iterations, 0.1 degrees, 1 mm.
+    /// GICP with the defaults of small_gicp 1.0.1: 20 iterations, 0.1 degrees, 1 mm.
     pub fn gicp(gate_m: f64) -> Self {
         RegisterOptions {
             method: Method::Gicp,
@@ -108,9 +108,9 @@ impl RegisterOptions<'_> {
         }
     }
 
-    /// GICP-SE(3) as the authors of Semantic-ICP publish it (gicp.hpp), with their squared gate of 250 m^2.
+    /// GICP-SE(3) as published with Semantic-ICP (gicp.hpp), with its squared gate of 250 m^2.
     pub fn gicp_se3() -> Self {
-        // They stop at ||log||^2 < 1e-5.
+        // The published tolerance is ||log||^2 < 1e-5.
         let tolerance = (0.5e-5_f64).sqrt();
         RegisterOptions {
             method: Method::GicpSe3,
@@ -123,7 +123,7 @@ impl RegisterOptions<'_> {
         }
     }
 
-    /// Semantic-ICP as the authors publish it (em_icp.hpp), or their printed form.
+    /// Semantic-ICP as published by its authors (em_icp.hpp), or as printed in the paper.
     pub fn semantic(variant: SemanticVariant, labels: LabelUse) -> Self {
         RegisterOptions {
             method: Method::Semantic(variant),
@@ -133,7 +133,7 @@ impl RegisterOptions<'_> {
         }
     }
 
-    /// Normalised Semantic-ICP that starts with wide variances.
+    /// Normalized Semantic-ICP with annealed variances.
     pub fn semantic_em(gate_m: f64, labels: LabelUse) -> Self {
         RegisterOptions {
             gate_m,
@@ -145,7 +145,7 @@ impl RegisterOptions<'_> {
         }
     }
 
-    /// Class-wise Semantic-ICP with the kernel and the stop of GICP-SE(3), for sparse clouds.
+    /// Class-wise Semantic-ICP with the kernel and the tolerances of GICP-SE(3), for sparse clouds.
     pub fn class_wise_cauchy() -> Self {
         RegisterOptions {
             method: Method::ClassWise,
@@ -156,7 +156,7 @@ impl RegisterOptions<'_> {
 
     /// Class-wise Semantic-ICP as published in 2017 (semantic_icp.hpp).
     pub fn class_wise() -> Self {
-        // They stop at ||log||^2 < 1e-3.
+        // The published tolerance is ||log||^2 < 1e-3.
         let tolerance = (0.5e-3_f64).sqrt();
         RegisterOptions {
             method: Method::ClassWise,

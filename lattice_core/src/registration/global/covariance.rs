@@ -1,4 +1,4 @@
-//! Covariance of a pose.
+//! Covariance of a pose with correlated errors and degenerate directions.
 
 use std::collections::BTreeMap;
 
@@ -8,68 +8,70 @@ use nalgebra::{
 
 use super::super::PreparedCloud;
 use super::super::likelihood::region_of;
-use super::types::{DirectionKind, WeakDirection};
+use super::calibration::{DirectionKind, WeakDirection};
 use crate::pose::se3;
 
-/// Distance in standard deviations at which a point counts half.
+/// Residual at which the robust kernel halves the weight, in standard deviations.
 pub(super) const KERNEL: f64 = 3.0;
-/// Squared tilt in standard deviations that is still believed; one in ten thousand is larger.
+/// Largest accepted squared Mahalanobis tilt; exceeded with probability 1e-4.
 const MAX_TILT_SQUARED: f64 = 18.4;
-/// Least standard deviation of points across surfaces, metres.
-const LEAST_POINT_M: f64 = 0.005;
-/// Spacings of the target by which a surface errs whose normals are at right angles in the two clouds.
+/// Minimum standard deviation of points across surfaces, metres.
+const MIN_POINT_M: f64 = 0.005;
+/// Error of a surface whose normals in the two clouds are orthogonal, in spacings of the target.
 const BENT: f64 = 0.8;
-/// Variance of the mean of two normals along a direction over the squared sine of the angle between them: the difference
-/// has twice the variance of each, the mean half of it, and two directions share both.
-const OF_MEAN_NORMAL: f64 = 0.125;
-/// Least share of the information of a direction that errors of the normals leave.
-const LEAST_LEFT: f64 = 1e-3;
-/// Least information of a direction over that of the best held one; below it there is none.
-const NONE: f64 = 1e-9;
-
-/// Covariance of a pose whose source is a surface that is wrong by whole regions.
+/// Ratio of the variance of the mean normal along one direction to the squared sine of the angle between the normals.
 ///
-/// Points of a region err together (a mesh is bent, a depth camera is off), which the inverse Hessian
-/// does not know: it would be far too small (Bonnabel et al., arXiv 1410.7632). So the pull of each
-/// region is what varies: as the residuals show it, as the source is known to err, and as surfaces err that are not
-/// planes: H^-1 (sum over regions of the covariance of their pulls) H^-1. Points pull across surfaces only: a plane holds
-/// nothing along itself, though the nearest point of it does, nor does it by the noise of its normals, of which H is
-/// rid as in a regression whose regressors err.
+/// The difference has twice the variance of each normal, the mean half of it, and two directions share both.
+const MEAN_NORMAL_VARIANCE: f64 = 0.125;
+/// Minimum fraction of the information of a direction that remains after the correction for errors of the normals.
+const MIN_REMAINING: f64 = 1e-3;
+/// Information below which a direction has none, relative to the best constrained one.
+const MIN_RELATIVE_INFORMATION: f64 = 1e-9;
+
+/// Covariance of a pose of a source surface with region-wise correlated errors.
+///
+/// Errors within a region are correlated: a mesh is bent, a depth camera is biased. The inverse Hessian H^-1 ignores
+/// this and is far too small (Bonnabel et al., arXiv 1410.7632). The covariance is therefore H^-1 (sum over regions
+/// of the covariance of their gradients) H^-1. The gradient of a region varies with its residuals, with the errors of
+/// the source, and with the curvature of the surfaces. Residuals count across surfaces only, since a plane does not
+/// constrain motions along itself. H is corrected for the errors of the normals, as in an errors-in-variables
+/// regression.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct PoseCovariance {
-    /// Covariance of a motion and a turn in the source frame (rho, phi; right perturbation).
+    /// Covariance of a right perturbation (rho, phi), in the source frame.
     pub at_source: Matrix6<f64>,
 }
 
+/// Error model of a source and its target.
 pub(super) struct ErrorModel {
-    /// Side of a region that errs as one, metres.
+    /// Side of the regions within which errors are correlated, metres.
     pub region_m: f64,
-    /// Side of smaller regions that err too, in a source that is hardly larger than a region, metres.
+    /// Side of additional smaller regions, for a source that is hardly larger than a region, metres.
     pub within_m: Option<f64>,
-    /// Standard deviation of a region's place along each axis, metres.
+    /// Standard deviation of the position of a region along each axis, metres.
     pub sigma_m: f64,
     /// Standard deviation of points across surfaces, metres.
     pub point_m: f64,
     /// Spacing of the target's points, metres.
     pub spacing_m: f64,
-    /// Standard deviation of the source's scale.
+    /// Standard deviation of the scale of the source.
     pub scale_sigma: f64,
-    /// Place in the source from which its scale counts.
+    /// Centre of the scaling in the source frame.
     pub center: Point3<f64>,
-    /// Farthest that a partner may be, metres.
+    /// Maximum distance of correspondences, metres.
     pub gate_m: f64,
 }
 
-/// Pull of the points of a region on the pose.
+/// Gradient of a region and its derivatives by the errors of the region.
 #[derive(Clone, Copy, Default)]
-struct Pull {
+struct RegionGradient {
     residual: Vector6<f64>,
     motion: Matrix6x3<f64>,
     bend: Matrix6x3<f64>,
 }
 
 impl PoseCovariance {
-    /// At a pose; None if the points do not hold it at all.
+    /// Computes the covariance at a pose; `None` if the points do not constrain it.
     pub fn at(
         source: &PreparedCloud,
         target: &PreparedCloud,
@@ -78,7 +80,7 @@ impl PoseCovariance {
     ) -> Option<PoseCovariance> {
         let mut information = Information::default();
         let mut scaling = Vector6::zeros();
-        let mut pulls: BTreeMap<[i64; 3], Pull> = BTreeMap::new();
+        let mut gradients: BTreeMap<[i64; 3], RegionGradient> = BTreeMap::new();
         let mut within: BTreeMap<[i64; 3], Matrix6x3<f64>> = BTreeMap::new();
         for (i, point) in source.points_m().iter().enumerate() {
             let place = target_from_source * point;
@@ -95,28 +97,30 @@ impl PoseCovariance {
             };
             let sine_squared = ours.cross(theirs).norm_squared().min(1.0);
             let residual_m = across.dot(&(partner - place));
-            let sigmas = residual_m / model.point_m.max(LEAST_POINT_M);
+            let sigmas = residual_m / model.point_m.max(MIN_POINT_M);
             let weight = (1.0 - sine_squared) / (1.0 + (sigmas / KERNEL).powi(2));
             let lever = lever(target_from_source, point, &across);
             information.add(weight, &lever, sine_squared, point);
             scaling += lever * weight * across.dot(&(target_from_source * (point - model.center)));
-            let pull = pulls.entry(region_of(point, model.region_m)).or_default();
-            pull.residual += lever * weight * residual_m;
+            let gradient = gradients
+                .entry(region_of(point, model.region_m))
+                .or_default();
+            gradient.residual += lever * weight * residual_m;
             let motion = lever * weight * across.transpose();
-            pull.motion += motion;
-            pull.bend += motion * (BENT * model.spacing_m * sine_squared.sqrt());
+            gradient.motion += motion;
+            gradient.bend += motion * (BENT * model.spacing_m * sine_squared.sqrt());
             if let Some(side_m) = model.within_m {
                 *within.entry(region_of(point, side_m)).or_default() += motion;
             }
         }
         let mut scatter = model.scale_sigma.powi(2) * scaling * scaling.transpose();
-        for pull in pulls.values() {
-            scatter += pull.residual * pull.residual.transpose();
-            scatter += pull.bend * pull.bend.transpose();
+        for gradient in gradients.values() {
+            scatter += gradient.residual * gradient.residual.transpose();
+            scatter += gradient.bend * gradient.bend.transpose();
         }
-        for motion in pulls
+        for motion in gradients
             .values()
-            .map(|pull| &pull.motion)
+            .map(|gradient| &gradient.motion)
             .chain(within.values())
         {
             scatter += model.sigma_m.powi(2) * motion * motion.transpose();
@@ -124,13 +128,12 @@ impl PoseCovariance {
         let inverse = information.inverse()?;
         let at_source = inverse * scatter * inverse;
         let finite = at_source.iter().all(|c| c.is_finite());
-        (finite && !pulls.is_empty()).then_some(PoseCovariance { at_source })
+        (finite && !gradients.is_empty()).then_some(PoseCovariance { at_source })
     }
 
-    /// The pose and its covariance when both frames are known to stand upright up to `sigma_rad`.
+    /// Updates the pose and its covariance with a tilt of zero, measured with `sigma_rad`.
     ///
-    /// A Kalman update with the tilt as measurement. None if the pose leans by more than both can
-    /// explain: then one of the frames does not stand upright.
+    /// A Kalman update. `None` if the tilt exceeds both uncertainties: then one of the frames is not gravity-aligned.
     pub fn upright(
         &self,
         pose: &Isometry3<f64>,
@@ -157,25 +160,27 @@ impl PoseCovariance {
         Some((pose * se3::exp(&-(gain * tilt)), upright))
     }
 
-    /// The covariance of [`PoseCovariance::upright`]; the same if `sigma_rad` is infinite.
+    /// Covariance of [`PoseCovariance::upright`]; unchanged if `sigma_rad` is infinite.
     pub fn with_gravity(&self, pose: &Isometry3<f64>, sigma_rad: f64) -> Option<PoseCovariance> {
         match sigma_rad.is_finite() {
-            true => self.upright(pose, sigma_rad).map(|(_, sure)| sure),
+            true => self
+                .upright(pose, sigma_rad)
+                .map(|(_, covariance)| covariance),
             false => Some(*self),
         }
     }
 
-    /// As wide as it takes for another pose to be that probable.
-    pub fn with_rival(
+    /// Inflates the covariance for an alternative pose of a given probability.
+    pub fn with_alternative(
         self,
         pose: &Isometry3<f64>,
-        rival: &Isometry3<f64>,
+        alternative: &Isometry3<f64>,
         probability: f64,
     ) -> PoseCovariance {
-        let off = se3::log(&(pose.inverse() * rival));
-        // Variance of a choice between the two.
+        let off = se3::log(&(pose.inverse() * alternative));
+        // Variance of a Bernoulli choice between the two poses.
         let spread = probability * (1.0 - probability) * off * off.transpose();
-        // Rivals of one kind come many times: the widest counts, not their sum.
+        // Similar alternatives repeat: the widest counts, not their sum.
         let here = off.dot(&(self.at_source * off));
         let wider = off.dot(&(spread * off)) > here;
         match wider {
@@ -186,7 +191,7 @@ impl PoseCovariance {
         }
     }
 
-    /// In the order of `geometry_msgs/PoseWithCovariance`, about the axes of the target frame.
+    /// Converts to the order of `geometry_msgs/PoseWithCovariance`, about the axes of the target frame.
     pub fn in_target(&self, target_from_source: &Isometry3<f64>) -> Matrix6<f64> {
         let turn = target_from_source.rotation.to_rotation_matrix();
         let mut both = Matrix6::zeros();
@@ -195,8 +200,9 @@ impl PoseCovariance {
         both * self.at_source * both.transpose()
     }
 
-    /// Standard deviations along the principal directions, in the target frame, the largest first of
-    /// each kind: of the place of a source point, and of the orientation.
+    /// Standard deviations along the principal directions of the translation of a source point and of the rotation.
+    ///
+    /// Directions are in the target frame, the largest first of each kind.
     pub fn directions(
         &self,
         target_from_source: &Isometry3<f64>,
@@ -230,7 +236,7 @@ impl PoseCovariance {
     }
 }
 
-/// Information on a pose, and that part of it which comes of errors of the normals.
+/// Information matrix of a pose, and the part caused by errors of the normals.
 #[derive(Clone, Copy, Default)]
 struct Information {
     all: Matrix6<f64>,
@@ -240,39 +246,39 @@ struct Information {
 impl Information {
     fn add(&mut self, weight: f64, lever: &Vector6<f64>, sine_squared: f64, point: &Point3<f64>) {
         self.all += lever * weight * lever.transpose();
-        // Errors of the normal go along the surface, in both directions alike.
+        // Errors of the normal are isotropic along the surface.
         let cross = point.coords.cross_matrix();
         let mut isotropic = Matrix3x6::zeros();
         isotropic.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
         isotropic.fixed_view_mut::<3, 3>(0, 3).copy_from(&-cross);
         let along = isotropic.transpose() * isotropic - lever * lever.transpose();
-        self.of_errors += along * (weight * OF_MEAN_NORMAL * sine_squared);
+        self.of_errors += along * (weight * MEAN_NORMAL_VARIANCE * sine_squared);
     }
 
-    /// Inverse of what is left without the errors; None if there is nothing.
+    /// Inverse of the corrected information matrix; `None` if there is no information.
     fn inverse(&self) -> Option<Matrix6<f64>> {
         let eigen = self.all.symmetric_eigen();
         let most = eigen.eigenvalues.max();
         if !(most.is_finite() && most > 0.0) {
             return None;
         }
-        let root = |value: f64| 1.0 / value.max(NONE * most).sqrt();
+        let root = |value: f64| 1.0 / value.max(MIN_RELATIVE_INFORMATION * most).sqrt();
         let whitened = eigen.eigenvectors * Matrix6::from_diagonal(&eigen.eigenvalues.map(root));
         let left = whitened.transpose() * (self.all - self.of_errors) * whitened;
         let left = (0.5 * (left + left.transpose())).symmetric_eigen();
         let basis = whitened * left.eigenvectors;
-        let inverse = left.eigenvalues.map(|value| 1.0 / value.max(LEAST_LEFT));
+        let inverse = left.eigenvalues.map(|value| 1.0 / value.max(MIN_REMAINING));
         Some(basis * Matrix6::from_diagonal(&inverse) * basis.transpose())
     }
 }
 
-/// Mean of two unit normals whose signs mean nothing; None if one of them is not a normal.
+/// Mean of two unit normals of arbitrary sign; `None` if it is undefined.
 fn mean_normal(ours: &Vector3<f64>, theirs: &Vector3<f64>) -> Option<Vector3<f64>> {
     let sign = 1.0_f64.copysign(ours.dot(theirs));
     (theirs + ours * sign).try_normalize(1e-6)
 }
 
-/// Derivative of a point's residual across a surface by a motion and a turn on the right of the pose, times -1.
+/// Negative derivative of a point's residual across a surface by a right perturbation of the pose (rho, phi).
 fn lever(
     target_from_source: &Isometry3<f64>,
     point: &Point3<f64>,
@@ -340,9 +346,9 @@ mod tests {
     /// Standard deviations of the place, metres, the largest first.
     fn sigmas(normals: &[Vector3<f64>]) -> [f64; 3] {
         let pose = Isometry3::identity();
-        let sure = covariance(normals, 1.0, None);
-        let (_, sure) = sure.upright(&pose, 0.006).unwrap();
-        let all = sure.directions(&pose, &Point3::new(1.0, 1.0, 1.0));
+        let covariance = covariance(normals, 1.0, None);
+        let (_, covariance) = covariance.upright(&pose, 0.006).unwrap();
+        let all = covariance.directions(&pose, &Point3::new(1.0, 1.0, 1.0));
         [all[0].sigma, all[1].sigma, all[2].sigma]
     }
 
@@ -359,7 +365,9 @@ mod tests {
     #[test]
     fn a_source_of_one_region_errs_within_it_too() {
         let normals = [Vector3::x(), Vector3::y(), Vector3::z()];
-        let turn = |sure: PoseCovariance| sure.at_source.fixed_view::<3, 3>(3, 3).trace().sqrt();
+        let turn = |covariance: PoseCovariance| {
+            covariance.at_source.fixed_view::<3, 3>(3, 3).trace().sqrt()
+        };
         let whole = turn(covariance(&normals, 8.0, None));
         let within = turn(covariance(&normals, 8.0, Some(0.5)));
         assert!(within > 2.0 * whole, "{within} {whole}");
@@ -372,11 +380,11 @@ mod tests {
         let loose = PoseCovariance {
             at_source: Matrix6::identity() * 1e-3,
         };
-        let (upright, sure) = loose.upright(&pose, 1e-4).unwrap();
+        let (upright, covariance) = loose.upright(&pose, 1e-4).unwrap();
         assert!((upright.rotation * Vector3::z()).xy().norm() < 1e-3);
         assert!((upright.rotation.euler_angles().2 - 1.2).abs() < 2e-3);
-        assert!(sure.at_source[(3, 3)] < 1e-6 && sure.at_source[(5, 5)] > 9e-4);
-        // Held by its surfaces it stays where it is; a lean that nothing explains is left alone.
+        assert!(covariance.at_source[(3, 3)] < 1e-6 && covariance.at_source[(5, 5)] > 9e-4);
+        // Held by its surfaces it stays where it is; an unexplained tilt is left.
         let held = PoseCovariance {
             at_source: Matrix6::identity() * 1e-8,
         };

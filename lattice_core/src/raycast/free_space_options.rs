@@ -1,4 +1,4 @@
-//! Options of a map of free space, and the reasons for which they are refused.
+//! Options of a map of free space, and their errors.
 
 use thiserror::Error;
 
@@ -7,23 +7,23 @@ use super::scan::Reach;
 use crate::lattice::LatticeError;
 use crate::voxels::DatumError;
 
-/// Coarsest free level: cells 8 times as wide.
+/// Maximum free level: cells 8 times as wide.
 pub const MAX_FREE_LEVEL: u32 = 3;
-/// Least memory of a map, bytes.
+/// Minimum memory of a map, bytes.
 pub const MIN_MAP_BYTES: usize = 1 << 20;
 
-/// Evidence, range, resolution and memory of a [`super::FreeSpaceMap`].
+/// Sensor model, range, resolution and memory of a [`super::FreeSpaceMap`].
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FreeSpaceOptions {
-    /// Weights of hits and misses.
+    /// Sensor model.
     pub evidence: Evidence,
-    /// Parts of rays that count.
+    /// Range of the rays.
     pub reach: Reach,
-    /// Free cells are kept in cells `2^free_level` as wide, at most [`MAX_FREE_LEVEL`]; `None`: only
-    /// cells that were hit are kept.
+    /// Level of the free cells, `2^free_level` as wide, at most [`MAX_FREE_LEVEL`]; `None` keeps only cells that were
+    /// hit.
     pub free_level: Option<u32>,
-    /// Most memory, bytes, at least [`MIN_MAP_BYTES`]. When it is used up, known blocks of cells are
-    /// still updated, and no new ones are added.
+    /// Maximum memory, bytes, at least [`MIN_MAP_BYTES`]; at the limit, existing blocks of cells are updated and no
+    /// new ones added.
     pub max_bytes: usize,
 }
 
@@ -38,26 +38,26 @@ impl Default for FreeSpaceOptions {
     }
 }
 
-/// An option that a map of free space cannot have.
+/// Option out of range.
 #[derive(Clone, PartialEq, Debug, Error)]
 pub enum FreeSpaceError {
-    /// The probabilities do not go together.
+    /// Inconsistent probabilities.
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
-    /// The datum is out of reach.
+    /// Datum out of range.
     #[error(transparent)]
     Datum(#[from] DatumError),
-    /// The coarse lattice of the free level cannot be made.
+    /// Free level without a coarse lattice.
     #[error("free level: {0}")]
     Coarse(#[from] LatticeError),
-    /// The range limit is not positive.
-    #[error("max_range_m {0} is not above 0")]
+    /// Range limit that is not positive.
+    #[error("max range {0} m is not above 0 (`max_range_m`)")]
     Range(f64),
-    /// The free level is too coarse.
-    #[error("free_level {0} is above {MAX_FREE_LEVEL}")]
+    /// Free level out of range.
+    #[error("free level {0} is above {MAX_FREE_LEVEL} (`free_level`)")]
     FreeLevel(u32),
-    /// The limit of memory is too low.
-    #[error("max_bytes {0} is below {MIN_MAP_BYTES}")]
+    /// Memory limit out of range.
+    #[error("memory limit {0} bytes is below {MIN_MAP_BYTES} (`max_bytes`)")]
     Memory(usize),
 }
 

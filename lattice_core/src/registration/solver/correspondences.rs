@@ -1,11 +1,11 @@
-//! Pairs of source and target points, found at one pose and measured at others.
+//! Correspondences of source and target points, found at one pose and evaluated at others.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::normal_equations::Sums;
-use super::pair::{Metric, Pair};
-use super::pair_weights::{Labels, labels};
+use super::correspondence::{Correspondence, Metric};
+use super::correspondence_weights::{Labels, labels};
+use super::normal_equations::NormalEquations;
 use super::robust_kernel::Kernel;
 use crate::kd_tree::{Nearest, Neighbors};
 use crate::registration::prepared::squared_reach;
@@ -14,47 +14,50 @@ use crate::registration::{
     MAX_CANDIDATES, Method, PreparedCloud, RegisterOptions, SemanticVariant,
 };
 
-/// Source points of one piece of parallel work.
+/// Source points per parallel task.
 const CHUNK: usize = 256;
+/// Target index of a source point without a correspondence.
 pub(super) const NONE: u32 = u32::MAX;
 
+/// Candidate correspondence of a source point.
 #[derive(Clone, Copy)]
 pub(super) struct Slot {
     pub target: u32,
     pub weight: f64,
 }
 
-/// A surface to be laid upon another: of whole clouds, or of one class.
+/// Source and target surface of the whole clouds, or of one class.
 pub(super) struct Layer<'a> {
     pub source: &'a Surface,
     pub target: &'a Surface,
 }
 
-pub(super) struct Pairs<'a> {
+/// Correspondences of two clouds with their cost.
+pub(super) struct Correspondences<'a> {
     layers: Vec<Layer<'a>>,
     pub(super) labels: Labels<'a>,
     pub(super) options: &'a RegisterOptions<'a>,
     pub(super) metric: Metric,
     kernel: Kernel,
-    /// Flatness of the source's covariances if the gradient follows them as they turn, else 0. The
-    /// step does in no case.
+    /// Flatness of the source covariances if the gradient includes their rotation, else 0. The Hessian does not
+    /// include it.
     turn: f64,
-    /// Variances are taken as so many times as large.
+    /// Factor on the variances.
     pub(super) scale: f64,
-    /// Point of the source about which it turns, m: lever arms count from there.
+    /// Centre of the rotations in the source, metres; lever arms start there.
     center: Point3<f64>,
     candidates: usize,
     stride: usize,
     squared_gate_m2: f64,
-    /// For each layer, `candidates` for each source point used.
+    /// Candidates of each used source point, by layer.
     slots: Vec<Vec<Slot>>,
 }
 
-/// A pose taken apart for many points.
+/// Pose as a rotation matrix and a translation, for many points.
 pub(super) struct Placed {
     rotation: nalgebra::Matrix3<f64>,
     p: Vector3<f64>,
-    /// Place of the centre of the source.
+    /// Transformed centre of the source.
     center: Vector3<f64>,
 }
 
@@ -76,13 +79,13 @@ impl Placed {
     }
 }
 
-impl<'a> Pairs<'a> {
+impl<'a> Correspondences<'a> {
     pub fn new(
         source: &'a PreparedCloud,
         target: &'a PreparedCloud,
         options: &'a RegisterOptions<'a>,
         center: Point3<f64>,
-    ) -> Pairs<'a> {
+    ) -> Correspondences<'a> {
         let layers = match options.method {
             Method::ClassWise => class_layers(source, target, options.min_class_points),
             _ => vec![Layer {
@@ -112,7 +115,7 @@ impl<'a> Pairs<'a> {
             let used = layer.source.points_m.len().div_ceil(stride);
             vec![none; used * candidates]
         });
-        Pairs {
+        Correspondences {
             slots: slots.collect(),
             layers,
             labels: labels(source, target, options),
@@ -128,7 +131,7 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// Scale of the variances with which a third of the gate across two planes is one deviation.
+    /// Factor on the variances at which a third of the gate across two planes is one standard deviation.
     pub fn widest_scale(&self) -> f64 {
         let Metric::Planes { target, source } = self.metric else {
             return 1.0;
@@ -137,32 +140,32 @@ impl<'a> Pairs<'a> {
         (self.squared_gate_m2 / 9.0 / across_m2).clamp(1.0, 1e12)
     }
 
-    /// Finds the pairs anew and sums up their linear system.
-    pub fn find(&mut self, pose: &Isometry3<f64>, scale: f64) -> Sums {
+    /// Finds the correspondences at a pose and accumulates their normal equations.
+    pub fn find(&mut self, pose: &Isometry3<f64>, scale: f64) -> NormalEquations {
         self.scale = scale;
         self.kernel = kernel(self.options, scale);
         let placed = Placed::new(pose, &self.center);
         let mut slots = std::mem::take(&mut self.slots);
-        let mut sums = Sums::default();
+        let mut sums = NormalEquations::default();
         for (layer, slots) in self.layers.iter().zip(&mut slots) {
             let chunks = slots.par_chunks_mut(CHUNK * self.candidates).enumerate();
-            let parts: Vec<Sums> = chunks
+            let parts: Vec<NormalEquations> = chunks
                 .map(|(chunk, slots)| self.find_chunk(layer, &placed, chunk * CHUNK, slots))
                 .collect();
-            sums = parts.iter().fold(sums, Sums::merge);
+            sums = parts.iter().fold(sums, NormalEquations::merge);
         }
         self.slots = slots;
         sums
     }
 
-    /// The linear system of the same pairs at another pose.
-    pub fn linearize(&self, pose: &Isometry3<f64>) -> Sums {
+    /// Normal equations of the same correspondences at another pose.
+    pub fn linearize(&self, pose: &Isometry3<f64>) -> NormalEquations {
         self.each(pose, |sums, pair, weight| {
             sums.add(pair, weight, self.kernel, self.turn);
         })
     }
 
-    /// The cost of the same pairs at another pose.
+    /// Cost of the same correspondences at another pose.
     pub fn cost(&self, pose: &Isometry3<f64>) -> f64 {
         let sums = self.each(pose, |sums, pair, weight| {
             sums.cost += self.kernel.apply(weight, pair.squared()).0;
@@ -170,13 +173,17 @@ impl<'a> Pairs<'a> {
         sums.cost
     }
 
-    fn each(&self, pose: &Isometry3<f64>, add: impl Fn(&mut Sums, &Pair, f64) + Sync) -> Sums {
+    fn each(
+        &self,
+        pose: &Isometry3<f64>,
+        add: impl Fn(&mut NormalEquations, &Correspondence, f64) + Sync,
+    ) -> NormalEquations {
         let placed = Placed::new(pose, &self.center);
-        let mut sums = Sums::default();
+        let mut sums = NormalEquations::default();
         for (layer, slots) in self.layers.iter().zip(&self.slots) {
             let chunks = slots.par_chunks(CHUNK * self.candidates).enumerate();
             let part = |(chunk, slots): (usize, &[Slot])| {
-                let mut sums = Sums::default();
+                let mut sums = NormalEquations::default();
                 for (at, slots) in slots.chunks_exact(self.candidates).enumerate() {
                     let i = (chunk * CHUNK + at) * self.stride;
                     let (q, m) = placed.place(layer.source, i);
@@ -189,8 +196,8 @@ impl<'a> Pairs<'a> {
                 }
                 sums
             };
-            let parts: Vec<Sums> = chunks.map(part).collect();
-            sums = parts.iter().fold(sums, Sums::merge);
+            let parts: Vec<NormalEquations> = chunks.map(part).collect();
+            sums = parts.iter().fold(sums, NormalEquations::merge);
         }
         sums
     }
@@ -202,14 +209,20 @@ impl<'a> Pairs<'a> {
         placed: &Placed,
         source: (&Point3<f64>, &Vector3<f64>),
         target: u32,
-    ) -> Pair {
+    ) -> Correspondence {
         let j = target as usize;
         let target = (&layer.target.points_m[j], &layer.target.normals[j]);
-        Pair::new(self.metric, &placed.center, source, target)
+        Correspondence::new(self.metric, &placed.center, source, target)
     }
 
-    fn find_chunk(&self, layer: &Layer, placed: &Placed, first: usize, slots: &mut [Slot]) -> Sums {
-        let mut sums = Sums::default();
+    fn find_chunk(
+        &self,
+        layer: &Layer,
+        placed: &Placed,
+        first: usize,
+        slots: &mut [Slot],
+    ) -> NormalEquations {
+        let mut sums = NormalEquations::default();
         let mut found = Neighbors::default();
         for (at, slots) in slots.chunks_exact_mut(self.candidates).enumerate() {
             let i = (first + at) * self.stride;
@@ -232,7 +245,7 @@ impl<'a> Pairs<'a> {
         sums
     }
 
-    /// The last pair's target cannot be nearer than the nearest: where the search begins.
+    /// Finds the nearest target point; the search starts with the distance of the last one.
     fn find_one(&self, layer: &Layer, q: &Point3<f64>, slot: &mut Slot) {
         let mut nearest = Nearest {
             index: NONE,
@@ -254,6 +267,7 @@ impl<'a> Pairs<'a> {
         };
     }
 
+    /// Finds the nearest target points of a source point.
     fn find_many(&self, layer: &Layer, q: &Point3<f64>, slots: &mut [Slot], found: &mut Neighbors) {
         let old = slots
             .iter()
@@ -272,6 +286,7 @@ impl<'a> Pairs<'a> {
     }
 }
 
+/// Surfaces of the classes that both clouds contain.
 fn class_layers<'a>(
     source: &'a PreparedCloud,
     target: &'a PreparedCloud,
@@ -287,6 +302,7 @@ fn class_layers<'a>(
     source.classes().iter().filter_map(layer).collect()
 }
 
+/// Robust kernel of a method.
 fn kernel(options: &RegisterOptions, scale: f64) -> Kernel {
     let alpha = options.cauchy_alpha;
     if !(alpha.is_finite() && alpha > 0.0) {

@@ -1,47 +1,45 @@
-//! Fit of a cloud at a pose as such, whatever other poses do: the regions of it that the map explains, and the places
-//! of those that it does not.
+//! Fit of a cloud at one pose, independent of the alternatives: its residuals by region and the unexplained regions.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::super::likelihood::region_of;
-use super::candidates::Workbench;
+use super::candidates::RegistrationContext;
 use super::rays::crossing_m;
 
-/// Fewest points of a region that says anything.
+/// Minimum number of points in a region that is tested.
 const MIN_POINTS: usize = 8;
-/// Standard deviations by which a region lies beside the surfaces of the map.
-const BESIDE: f64 = 3.0;
-/// Share of the points of a region in one direction that hold it there.
-const HELD: f64 = 0.1;
-/// Share of the points of a region that something must be true of for it to be true of the region.
-const MOST: f64 = 0.5;
-/// Regions that are listed, at most.
+/// Shift of a region from the surfaces of the map that is significant, in standard deviations.
+const SIGNIFICANT_SHIFT: f64 = 3.0;
+/// Information of a region along a direction that constrains it, as a fraction of its points.
+const MIN_INFORMATION: f64 = 0.1;
+/// Fraction of the points of a region above which a property of points holds for the region.
+const MAJORITY: f64 = 0.5;
+/// Maximum number of listed regions.
 const LISTED: usize = 16;
-/// Distance of a surface from a point by which it is another, in cells.
+/// Distance from a point to a different surface, in cells.
 const CLEAR: f64 = 5.0;
-/// Longest way behind a point on which a surface of the map is looked for, metres.
+/// Length of the ray behind a point that is searched for a surface, metres.
 const BEHIND_M: f64 = 10.0;
 
-/// Fit of a cloud to a map as such, part by part.
+/// Fit of a cloud to a map by region.
 #[derive(Clone, PartialEq, Debug, Default)]
-pub struct AbsoluteFit {
-    /// Squared shift of the regions against the map, in variances that sensor and cells explain, mean over all
-    /// directions that are held: about 1 or less where nothing else is at work.
+pub struct FitDiagnostics {
+    /// Mean squared Mahalanobis shift of the regions over all constrained directions; near 1 or less if sensor noise
+    /// and quantization explain the residuals.
     pub chi_square: f64,
-    /// Share of the points that float before a surface of the map, with nothing of the map where they are; 0 if the
-    /// place of the sensor is not known.
+    /// Fraction of the points in free space in front of a surface of the map; 0 if the sensor position is unknown.
     pub floating: f64,
-    /// Share of the lines of sight that go through a surface of the map.
+    /// Fraction of the lines of sight that pass through a surface of the map.
     pub blocked: f64,
-    /// Regions that are not explained, those with the most points first; at most 16.
+    /// Unexplained regions in descending order of their points; at most 16.
     pub unexplained: Vec<Unexplained>,
 }
 
-impl AbsoluteFit {
-    /// The regions that are not explained, in words; None if all are.
-    pub(super) fn in_words(&self) -> Option<String> {
+impl FitDiagnostics {
+    /// Describes the unexplained regions; `None` if there are none.
+    pub(super) fn describe(&self) -> Option<String> {
         let first = self.unexplained.first()?;
         let [x, y, z] = [first.place_m.x, first.place_m.y, first.place_m.z];
         let regions = match self.unexplained.len() {
@@ -56,34 +54,34 @@ impl AbsoluteFit {
     }
 }
 
-/// A region of a cloud that the map does not explain.
+/// Region of a cloud that the map does not explain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Unexplained {
     /// Kind of the misfit.
     pub kind: UnexplainedKind,
-    /// Midst of its points, in the map, metres.
+    /// Centroid of its points in the map, metres.
     pub place_m: Point3<f64>,
-    /// Its points, of those that were registered.
+    /// Number of its registered points.
     pub points: usize,
-    /// Distance from the surfaces of the map, metres; 0 where there are none.
+    /// Distance from the surfaces of the map, metres; 0 if there are none nearby.
     pub beside_m: f64,
 }
 
-/// Kind of a region that is not explained.
+/// Kind of an unexplained region.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum UnexplainedKind {
-    /// The map has no surface there, and none behind it.
+    /// The map has no surface there and none behind it.
     Missing,
-    /// The map has no surface there, but one behind it: something new, or the wrong place.
+    /// The map has free space there and a surface behind it: a new object or a wrong pose.
     Floating,
-    /// It lies beside a surface of the map.
+    /// The region is shifted from a surface of the map.
     Beside,
-    /// It was seen through a surface of the map: something is gone, or it is the wrong place.
+    /// The lines of sight pass through a surface of the map: a removed object or a wrong pose.
     Hidden,
 }
 
 impl UnexplainedKind {
-    /// Name in answers.
+    /// Name in results.
     pub fn name(self) -> &'static str {
         match self {
             UnexplainedKind::Missing => "missing",
@@ -94,33 +92,36 @@ impl UnexplainedKind {
     }
 }
 
-/// Points of a region, and what they say.
+/// Sums over the points of a region.
 #[derive(Default)]
 struct Region {
     points: usize,
     sum_m: Vector3<f64>,
-    /// Points with a surface of the map near them, and the sums over them that a shift follows from.
+    /// Inliers, and the normal equations of a shift over them.
     near: usize,
     normals: Matrix3<f64>,
-    pull_m: Vector3<f64>,
-    /// Points that were looked at from the sensor, those that float, and those behind a surface.
-    looked_at: usize,
+    residual_m: Vector3<f64>,
+    /// Traced lines of sight; of these, the ones ending in free space and the ones passing through a surface.
+    traced: usize,
     floating: usize,
     hidden: usize,
 }
 
-/// Shift of a region along a direction in which it is held.
+/// Shift of a region along a constrained direction.
 #[derive(Clone, Copy)]
 struct Shift {
     meters: f64,
     sigmas: f64,
 }
 
-/// Judges a pose by itself.
-pub(super) fn absolute_fit(bench: &Workbench<'_>, pose: &Isometry3<f64>) -> AbsoluteFit {
-    let regions = regions(bench, pose);
-    let scale = bench.map.scale(bench.options.noise_m);
-    let sigmas_m = (bench.options.noise_m, scale.normal_m);
+/// Computes the fit of the source at a pose.
+pub(super) fn fit_diagnostics(
+    context: &RegistrationContext<'_>,
+    pose: &Isometry3<f64>,
+) -> FitDiagnostics {
+    let regions = regions(context, pose);
+    let scale = context.map.scale(context.options.noise_m);
+    let sigmas_m = (context.options.noise_m, scale.normal_m);
     let (mut chi_square, mut held) = (0.0, 0_u32);
     let mut unexplained = Vec::new();
     for region in regions.values().filter(|r| r.points >= MIN_POINTS) {
@@ -132,21 +133,21 @@ pub(super) fn absolute_fit(bench: &Workbench<'_>, pose: &Isometry3<f64>) -> Abso
     unexplained.sort_by_key(|region| std::cmp::Reverse(region.points));
     unexplained.truncate(LISTED);
     let sum = |of: fn(&Region) -> usize| regions.values().map(of).sum::<usize>() as f64;
-    let looked_at = sum(|r| r.looked_at).max(1.0);
-    AbsoluteFit {
+    let traced = sum(|r| r.traced).max(1.0);
+    FitDiagnostics {
         chi_square: chi_square / f64::from(held.max(1)),
-        floating: sum(|r| r.floating) / looked_at,
-        blocked: sum(|r| r.hidden) / looked_at,
+        floating: sum(|r| r.floating) / traced,
+        blocked: sum(|r| r.hidden) / traced,
         unexplained,
     }
 }
 
-/// The regions that err together, in the order of their places in the cloud.
-fn regions(bench: &Workbench<'_>, pose: &Isometry3<f64>) -> BTreeMap<[i64; 3], Region> {
-    let (map, side_m) = (&bench.map.cloud, bench.options.region_m);
-    let gate_m = bench.map.scale(bench.options.noise_m).gate_m();
+/// Sums over the regions of correlated errors, in the order of their keys.
+fn regions(context: &RegistrationContext<'_>, pose: &Isometry3<f64>) -> BTreeMap<[i64; 3], Region> {
+    let (map, side_m) = (&context.map.cloud, context.options.region_m);
+    let gate_m = context.map.scale(context.options.noise_m).gate_m();
     let mut regions: BTreeMap<[i64; 3], Region> = BTreeMap::new();
-    for point in bench.input.full.points_m() {
+    for point in context.source.full.points_m() {
         let place = pose * point;
         let region = regions.entry(region_of(point, side_m)).or_default();
         region.points += 1;
@@ -156,15 +157,15 @@ fn regions(bench: &Workbench<'_>, pose: &Isometry3<f64>) -> BTreeMap<[i64; 3], R
         if let Some((q, n)) = near {
             region.near += 1;
             region.normals += n * n.transpose();
-            region.pull_m += n * n.dot(&(place - q));
+            region.residual_m += n * n.dot(&(place - q));
         }
     }
-    let Some(sensor_m) = bench.input.sensor_m else {
+    let Some(sensor_m) = context.source.sensor_m else {
         return regions;
     };
-    let (from, occupied) = (pose * sensor_m, &bench.map.occupied);
-    let clear_m = CLEAR * bench.map.spacing_m;
-    for point in bench.input.few.points_m() {
+    let (from, occupied) = (pose * sensor_m, &context.map.occupied);
+    let clear_m = CLEAR * context.map.spacing_m;
+    for point in context.source.coarse.points_m() {
         let region = regions.entry(region_of(point, side_m)).or_default();
         let place = pose * point;
         let length = nalgebra::distance(&from, &place);
@@ -173,7 +174,7 @@ fn regions(bench: &Workbench<'_>, pose: &Isometry3<f64>) -> BTreeMap<[i64; 3], R
         }
         let direction = (place - from) / length;
         let crosses = |way| crossing_m(occupied, &from, &direction, way).is_some();
-        region.looked_at += 1;
+        region.traced += 1;
         if crosses(clear_m..length - clear_m) {
             region.hidden += 1;
         } else if map.nearest(&place, clear_m).is_none()
@@ -186,16 +187,17 @@ fn regions(bench: &Workbench<'_>, pose: &Isometry3<f64>) -> BTreeMap<[i64; 3], R
 }
 
 impl Region {
-    /// Shifts against the map, given the standard deviations of a region's place and of a point's, metres.
+    /// Shifts against the map along the constrained directions, given the standard deviations of a region's position
+    /// and of a point, metres.
     fn shifts(&self, (of_region_m, of_point_m): (f64, f64)) -> Vec<Shift> {
         let eigen = self.normals.symmetric_eigen();
         let directions = eigen
             .eigenvalues
             .iter()
             .zip(eigen.eigenvectors.column_iter());
-        let held = directions.filter(|(held, _)| **held > HELD * self.points as f64);
+        let held = directions.filter(|(held, _)| **held > MIN_INFORMATION * self.points as f64);
         let shift = |(held, axis): (&f64, _)| {
-            let meters = self.pull_m.dot(&axis) / held;
+            let meters = self.residual_m.dot(&axis) / held;
             let sigma_m = of_region_m.hypot(of_point_m / held.sqrt());
             Shift {
                 meters: meters.abs(),
@@ -205,14 +207,15 @@ impl Region {
         held.map(shift).collect()
     }
 
+    /// Misfit of the region, if there is one.
     fn unexplained(&self, shifts: &[Shift]) -> Option<Unexplained> {
-        let most = |n: usize, of: usize| n as f64 > MOST * of as f64;
-        let beside = shifts.iter().filter(|s| s.sigmas > BESIDE);
+        let most = |n: usize, of: usize| n as f64 > MAJORITY * of as f64;
+        let beside = shifts.iter().filter(|s| s.sigmas > SIGNIFICANT_SHIFT);
         let beside_m = beside.map(|s| s.meters).reduce(f64::max);
-        let kind = if most(self.hidden, self.looked_at) {
+        let kind = if most(self.hidden, self.traced) {
             UnexplainedKind::Hidden
         } else if !most(self.near, self.points) {
-            match most(2 * self.floating, self.looked_at) {
+            match most(2 * self.floating, self.traced) {
                 true => UnexplainedKind::Floating,
                 false => UnexplainedKind::Missing,
             }
@@ -245,8 +248,8 @@ mod tests {
             sum_m: Vector3::new(2.0, 1.0, 0.5) * n as f64,
             near,
             normals: normal * normal.transpose() * near as f64,
-            pull_m: normal * off_m * near as f64,
-            looked_at: n,
+            residual_m: normal * off_m * near as f64,
+            traced: n,
             ..Region::default()
         }
     }

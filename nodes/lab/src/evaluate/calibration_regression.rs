@@ -1,27 +1,27 @@
-//! Odds observed, as a power of those stated: a regression that uses all stated probabilities at once.
+//! Calibration regression: logistic regression of observed on stated log-odds, over all stated probabilities.
 
 use nalgebra::{Matrix2, Vector2};
 
 use super::statistics::Z;
 
-/// Fewest outcomes of each kind that a curve is fitted to.
+/// Minimum number of outcomes of each kind.
 const LEAST: usize = 10;
-/// Smallest probability that is told from smaller ones.
+/// Probability below which values are not distinguished.
 const SMALLEST: f64 = 1e-9;
-/// Steps of Newton's method, at most, and the length of one that is none.
+/// Maximum number of Newton steps, and the step length at convergence.
 const STEPS: usize = 50;
 const CONVERGED: f64 = 1e-7;
 
-/// Logistic curve of observed over stated log-odds (Cox 1958): intercept 0 and slope 1 where both are equal.
+/// Logistic curve of observed over stated log-odds (Cox 1958): intercept 0 and slope 1 if both are equal.
 #[derive(Clone, Copy, Debug)]
-pub struct OddsCurve {
+pub struct CalibrationCurve {
     parameters: Vector2<f64>,
     covariance: Matrix2<f64>,
 }
 
-impl OddsCurve {
-    /// The most likely curve, given stated probabilities and whether it was so; None if hardly any or nearly all were.
-    pub fn fit(outcomes: &[(f64, bool)]) -> Option<OddsCurve> {
+impl CalibrationCurve {
+    /// Fits the curve to stated probabilities and outcomes; `None` if there are too few of one kind.
+    pub fn fit(outcomes: &[(f64, bool)]) -> Option<CalibrationCurve> {
         let were = outcomes.iter().filter(|(_, was)| *was).count();
         if were < LEAST || outcomes.len() - were < LEAST {
             return None;
@@ -32,12 +32,12 @@ impl OddsCurve {
             let covariance = information.try_inverse()?;
             let mut step = covariance * gradient;
             if step.norm() < CONVERGED {
-                return Some(OddsCurve {
+                return Some(CalibrationCurve {
                     parameters,
                     covariance,
                 });
             }
-            // A whole step may lead too far where few outcomes hold the curve.
+            // A full step may overshoot if few outcomes constrain the curve.
             let here = log_likelihood(outcomes, &parameters);
             while log_likelihood(outcomes, &(parameters + step)) < here {
                 step *= 0.5;
@@ -50,12 +50,12 @@ impl OddsCurve {
         None
     }
 
-    /// Slope, and its standard deviation.
+    /// Slope and its standard deviation.
     pub fn slope(&self) -> (f64, f64) {
         (self.parameters.y, self.covariance.m22.sqrt())
     }
 
-    /// Probability that is observed where one is stated, between the ends of its 95 % interval.
+    /// Observed probability for a stated one, between the ends of its 95 % interval.
     pub fn observed(&self, stated: f64) -> [f64; 3] {
         let at = Vector2::new(1.0, log_odds(stated));
         let half = Z * (self.covariance * at).dot(&at).sqrt();
@@ -101,7 +101,7 @@ mod tests {
     use super::*;
     use crate::random::Stream;
 
-    /// Outcomes whose log-odds are `slope` times those that are stated, from even ones down to 1e-4.
+    /// Outcomes whose log-odds are `slope` times the stated ones, from 1:1 down to 1e-4.
     fn outcomes(slope: f64) -> Vec<(f64, bool)> {
         let random = &mut Stream::numbered(7, 1);
         let one = |_| {
@@ -115,7 +115,7 @@ mod tests {
     #[test]
     fn the_curve_is_that_of_the_outcomes() {
         for slope in [0.5, 1.0, 2.0] {
-            let curve = OddsCurve::fit(&outcomes(slope)).unwrap();
+            let curve = CalibrationCurve::fit(&outcomes(slope)).unwrap();
             let (found, sigma) = curve.slope();
             assert!(
                 (found - slope).abs() < 3.0 * sigma && sigma < 0.1 * slope,
@@ -129,11 +129,11 @@ mod tests {
 
     #[test]
     fn too_few_outcomes_have_no_curve() {
-        assert!(OddsCurve::fit(&[]).is_none());
+        assert!(CalibrationCurve::fit(&[]).is_none());
         let never: Vec<(f64, bool)> = outcomes(1.0).into_iter().map(|(p, _)| (p, false)).collect();
-        assert!(OddsCurve::fit(&never).is_none());
+        assert!(CalibrationCurve::fit(&never).is_none());
         // No curve of finite slope is the most likely one here.
         let split: Vec<(f64, bool)> = (1..100).map(|i| (f64::from(i) / 100.0, i > 50)).collect();
-        assert!(OddsCurve::fit(&split).is_none());
+        assert!(CalibrationCurve::fit(&split).is_none());
     }
 }

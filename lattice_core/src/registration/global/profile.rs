@@ -1,28 +1,29 @@
-//! Options by the kind of sensor that made a cloud.
+//! Sensor profiles: default options by the kind of sensor.
 
 use std::fmt;
 
 use super::cloud_statistics::CloudStatistics;
-use super::types::{CalibrationOptions, HeadsetScan};
+use super::request::{CalibrationOptions, SourceCloud};
 
-/// Range beyond which a laser scanner outdoors is at work, metres.
+/// Range above which a cloud is from an outdoor lidar, metres.
 const LIDAR_M: f64 = 15.0;
-/// Range beyond which what is noisy is the scan of a laser in rooms, metres: depth cameras see less far.
+/// Range above which a noisy cloud is from an indoor lidar, metres; depth cameras have a shorter range.
 const INDOOR_LIDAR_M: f64 = 5.5;
-/// Points of a cell of 10 cm from which on a depth camera may be at work: meshes of headsets have up to 16.
+/// Density from which a noisy cloud is from a depth camera, points per cell of 10 cm; meshes of headsets have up to
+/// 16.
 const DENSE: f64 = 24.0;
-/// Noise within such a cell from which on it is no mesh, metres.
+/// Noise within a cell from which a cloud is not a mesh, metres.
 const NOISY_M: f64 = 1.5e-3;
 
-/// Kind of sensor; what it sets is the default of every option.
+/// Kind of sensor, which sets the defaults of all options.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Profile {
-    /// The mesh of a mixed-reality headset, upright.
+    /// Mesh of a mixed-reality headset, gravity-aligned.
     #[default]
     Headset,
-    /// A laser scanner that may lean.
+    /// Laser scanner with unknown tilt.
     Lidar,
-    /// A depth camera with an IMU.
+    /// Depth camera with an IMU.
     DepthCamera,
 }
 
@@ -39,8 +40,8 @@ impl Profile {
         }
     }
 
-    /// The profile of the sensor that clouds look like, by their range, density and noise.
-    pub fn of(scans: &[HeadsetScan]) -> Profile {
+    /// Estimates the profile from the range, density and noise of clouds.
+    pub fn of(scans: &[SourceCloud]) -> Profile {
         let cloud = CloudStatistics::of(scans);
         let is_noisy = cloud.noise_m >= NOISY_M;
         match cloud.range_m {
@@ -51,7 +52,7 @@ impl Profile {
         }
     }
 
-    /// The options that it stands for.
+    /// Default options of the profile.
     pub fn options(self) -> CalibrationOptions {
         let profile = self;
         let headset = CalibrationOptions::default();
@@ -64,7 +65,7 @@ impl Profile {
                 scale_sigma: 0.0,
                 gravity_sigma_rad: f64::INFINITY,
                 start_radius_m: 30.0,
-                // Right poses of scans 30 m apart have 0.28 and more; wrong ones lack the margin.
+                // Correct poses of scans 30 m apart have at least 0.28; wrong ones lack the margin.
                 min_inliers: 0.2,
                 max_sigma_m: 0.15,
                 ..headset
@@ -94,7 +95,7 @@ mod tests {
     use nalgebra::Point3;
 
     /// Points `apart_m` from each other on a wall of `side_m`, with up to `noise_m` across it, seen from as far away.
-    fn wall(side_m: f64, apart_m: f64, noise_m: f64) -> HeadsetScan {
+    fn wall(side_m: f64, apart_m: f64, noise_m: f64) -> SourceCloud {
         let n = (side_m / apart_m) as u32;
         let places = (0..n).flat_map(|y| (0..n).map(move |z| (y, z)));
         let point = |(y, z): (u32, u32)| {
@@ -102,7 +103,7 @@ mod tests {
             let [y, z] = [y, z].map(|i| apart_m * (f64::from(i) + 0.5) - 0.5 * side_m);
             Point3::new(side_m + 0.03 + across_m, y, z)
         };
-        HeadsetScan {
+        SourceCloud {
             cloud: SemanticCloud::unlabelled(places.map(point).collect()),
             sensor_m: Some(Point3::origin()),
         }
