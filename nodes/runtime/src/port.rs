@@ -197,7 +197,7 @@ pub(crate) trait Transport: Send + Sync {
     fn id(&self) -> EndpointId;
 
     /// Participants that security keeps out. Each is a warning in the log; to be asked once a second.
-    fn strangers(&self) -> usize {
+    fn unauthenticated_participants(&self) -> usize {
         0
     }
 

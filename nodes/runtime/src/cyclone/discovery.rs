@@ -19,7 +19,7 @@ use super::endpoint::{Description, Endpoint, Side};
 use super::entity::{Entity, endpoint_id};
 use super::names::role;
 use super::qos::{announced, user_data};
-use super::strangers::Strangers;
+use super::unauthenticated_participants::UnauthenticatedParticipants;
 use crate::port::{DURABILITY_CONFLICT, EndpointId, PortEvent, RELIABILITY_CONFLICT};
 use crate::qos::{Durability, Reliability};
 use crate::remote::RemotePublisher;
@@ -35,7 +35,7 @@ pub(super) struct Discovery {
     participant: EndpointId,
     ours: Mutex<Vec<Weak<Endpoint>>>,
     events: Sender<PortEvent>,
-    strangers: Option<Strangers>,
+    unauthenticated_participants: Option<UnauthenticatedParticipants>,
 }
 
 /// An endpoint of another participant.
@@ -54,13 +54,15 @@ impl Discovery {
         events: Sender<PortEvent>,
         secured: bool,
     ) -> Result<Arc<Self>, String> {
-        let strangers = secured.then(|| Strangers::watch(participant)).transpose()?;
+        let unauthenticated_participants = secured
+            .then(|| UnauthenticatedParticipants::watch(participant))
+            .transpose()?;
         let this = Arc::new(Self {
             readers: Mutex::default(),
             participant: participant.id()?,
             ours: Mutex::default(),
             events,
-            strangers,
+            unauthenticated_participants,
         });
         for (topic, listener) in [
             (DDS_BUILTIN_TOPIC_DCPSPUBLICATION, on_writers as Listener),
@@ -82,8 +84,10 @@ impl Discovery {
     }
 
     /// Participants that are not let in.
-    pub(super) fn strangers(&self) -> usize {
-        self.strangers.as_ref().map_or(0, Strangers::count)
+    pub(super) fn unauthenticated_participants(&self) -> usize {
+        self.unauthenticated_participants
+            .as_ref()
+            .map_or(0, UnauthenticatedParticipants::count)
     }
 
     /// Compares an endpoint of ours with those that are there, and with those to come.
@@ -196,8 +200,8 @@ impl Discovery {
             let _ = self.events.try_send(PortEvent::Lost { peer: id });
             return;
         }
-        if let Some(strangers) = &self.strangers {
-            strangers.shows_itself(id);
+        if let Some(unauthenticated_participants) = &self.unauthenticated_participants {
+            unauthenticated_participants.mark_authenticated(id);
         }
         // SAFETY: strings and QoS are null or live as long as the endpoint.
         let (name, type_name, qos, user_data) = unsafe {

@@ -19,7 +19,7 @@ use crate::sync::lock;
 /// After this a line is told again: Cyclone refuses a stranger once a second.
 const AGAIN: Duration = Duration::from_secs(60);
 
-/// Different lines in that time, at most: strangers may name themselves anew each time.
+/// Different lines in that time, at most: an unauthenticated peer may change its name each time.
 const MAX_LINES: usize = 100;
 
 thread_local! {

@@ -15,7 +15,7 @@ mod qos;
 mod reader;
 mod sample;
 mod security;
-mod strangers;
+mod unauthenticated_participants;
 mod writer;
 
 pub(crate) use participant::Cyclone;

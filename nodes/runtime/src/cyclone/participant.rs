@@ -248,8 +248,8 @@ impl Transport for Cyclone {
         self.events.clone().boxed()
     }
 
-    fn strangers(&self) -> usize {
-        self.discovery.strangers()
+    fn unauthenticated_participants(&self) -> usize {
+        self.discovery.unauthenticated_participants()
     }
 }
 

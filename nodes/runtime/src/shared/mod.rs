@@ -264,9 +264,10 @@ impl Shared {
     }
 
     /// Participants that security keeps out.
-    fn strangers(&self) -> usize {
+    fn unauthenticated_participants(&self) -> usize {
         let open = lock(&self.open);
-        open.as_ref().map_or(0, |open| open.transport.strangers())
+        open.as_ref()
+            .map_or(0, |open| open.transport.unauthenticated_participants())
     }
 
     /// Gives handlers the messages that wait in this process. Not from a thread of the runtime.

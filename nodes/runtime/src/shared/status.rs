@@ -107,7 +107,7 @@ impl Shared {
             ("socket_receive_buffer_bytes".to_owned(), bytes),
             (
                 "participants_kept_out".to_owned(),
-                self.strangers().to_string(),
+                self.unauthenticated_participants().to_string(),
             ),
         ];
         let mut problems = Vec::new();

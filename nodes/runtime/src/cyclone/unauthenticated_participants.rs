@@ -32,7 +32,7 @@ const ADDRESSES: &CStr = c"__NetworkAddresses";
 type Prefix = [u8; 12];
 
 /// Watches who comes, and who shows endpoints.
-pub(super) struct Strangers {
+pub(super) struct UnauthenticatedParticipants {
     participants: Entity,
     ours: Option<Prefix>,
     others: Mutex<BTreeMap<Prefix, Other>>,
@@ -40,11 +40,11 @@ pub(super) struct Strangers {
 
 struct Other {
     since: Instant,
-    shows_itself: bool,
+    authenticated: bool,
     addresses: String,
 }
 
-impl Strangers {
+impl UnauthenticatedParticipants {
     pub(super) fn watch(participant: &Entity) -> Result<Self, String> {
         let (parent, topic) = (participant.handle(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT);
         // SAFETY: handles; no QoS and no listener.
@@ -57,10 +57,10 @@ impl Strangers {
     }
 
     /// An endpoint of a participant is known, so security has let the participant in.
-    pub(super) fn shows_itself(&self, endpoint: EndpointId) {
+    pub(super) fn mark_authenticated(&self, endpoint: EndpointId) {
         if let Some(prefix) = prefix(endpoint) {
             note(&mut lock(&self.others), prefix, |other| {
-                other.shows_itself = true
+                other.authenticated = true
             });
         }
     }
@@ -85,7 +85,7 @@ impl Strangers {
                 None => {}
             }
         });
-        let out = |other: &&Other| !other.shows_itself && other.since.elapsed() >= PATIENCE;
+        let out = |other: &&Other| !other.authenticated && other.since.elapsed() >= PATIENCE;
         let out = others.values().filter(out);
         out.inspect(|other| {
             let words = "is kept out: it has no certificate or no permissions that hold here";
@@ -102,7 +102,7 @@ fn note(others: &mut BTreeMap<Prefix, Other>, prefix: Prefix, change: impl FnOnc
     if others.len() < MAX_PARTICIPANTS || others.contains_key(&prefix) {
         change(others.entry(prefix).or_insert_with(|| Other {
             since: Instant::now(),
-            shows_itself: false,
+            authenticated: false,
             addresses: String::new(),
         }));
     }
