@@ -41,7 +41,7 @@ impl Gate {
         }
         let publishers = lock(&self.publishers).clone();
         for peers in publishers.iter().filter_map(Weak::upgrade) {
-            peers.meet_again();
+            peers.replay_match_events();
         }
     }
 }

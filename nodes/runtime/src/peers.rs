@@ -148,7 +148,7 @@ impl Peers {
     }
 
     /// Calls for peers that are there as if one had joined.
-    pub(crate) fn meet_again(&self) {
+    pub(crate) fn replay_match_events(&self) {
         if self.count() > 0 {
             self.call_back();
         }
