@@ -80,7 +80,7 @@ impl Neighbours {
             return;
         };
         let nodes = &mut lock(&self.0).nodes;
-        nodes.retain(|id, _| !id.is_beside(&participant));
+        nodes.retain(|id, _| !id.same_participant(&participant));
         for node in &message.node_entities_info_seq {
             let NodeEntitiesInfo {
                 node_name,
@@ -90,7 +90,7 @@ impl Neighbours {
             } = node;
             let name = names::fully_qualified(node_name, node_namespace);
             let ids = reader_gid_seq.iter().chain(writer_gid_seq).filter_map(id);
-            for id in ids.filter(|id| id.is_beside(&participant)) {
+            for id in ids.filter(|id| id.same_participant(&participant)) {
                 if nodes.len() < MAX_ENDPOINTS && name.len() <= MAX_NAME_BYTES {
                     nodes.insert(id, name.clone());
                 }

@@ -250,7 +250,7 @@ mod tests {
         peers.incompatible(peer(1), "reliability");
         peers.incompatible(peer(1), "reliability");
         assert_eq!(peers.incompatible_count(), 1);
-        peers.remove(|p| p.is_beside(&peer(1)));
+        peers.remove(|p| p.same_participant(&peer(1)));
         assert_eq!(peers.incompatible_count(), 0);
     }
 

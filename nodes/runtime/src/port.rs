@@ -43,7 +43,7 @@ impl EndpointId {
     }
 
     /// True for two endpoints of one participant.
-    pub(crate) fn is_beside(&self, other: &Self) -> bool {
+    pub(crate) fn same_participant(&self, other: &Self) -> bool {
         self.0.first_chunk::<12>() == other.0.first_chunk()
     }
 }

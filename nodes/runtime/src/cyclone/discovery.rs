@@ -193,7 +193,7 @@ impl Discovery {
         each: &mut dyn FnMut(&Other<'_>),
     ) {
         let id = endpoint_id(endpoint.key);
-        if id.is_beside(&self.participant) {
+        if id.same_participant(&self.participant) {
             return;
         }
         if !alive {

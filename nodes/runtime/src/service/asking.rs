@@ -68,7 +68,10 @@ impl Asking {
     pub(crate) async fn call(&self, request: &[u8]) -> Result<Vec<u8>, String> {
         let server = self.servers.known(|_| true).await;
         if self.form == ServiceForm::Topics {
-            let answerer = self.answerers.known(|peer| peer.is_beside(&server)).await;
+            let answerer = self
+                .answerers
+                .known(|peer| peer.same_participant(&server))
+                .await;
             self.until_known_to(&answerer).await;
         }
         let number = self.next.fetch_add(1, Relaxed);

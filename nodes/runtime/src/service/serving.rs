@@ -194,7 +194,9 @@ impl Serving {
             false => WAIT_FOR_CLIENT,
         };
         let known = async {
-            self.readers.known(|reader| reader.is_beside(client)).await;
+            self.readers
+                .known(|reader| reader.same_participant(client))
+                .await;
             true
         };
         let timeout = async {
