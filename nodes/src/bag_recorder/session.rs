@@ -35,7 +35,7 @@ pub(super) struct Session {
     pub cache: Arc<Cache>,
     /// True while nothing is taken.
     pub paused: Arc<AtomicBool>,
-    pub topics: Vec<Heard>,
+    pub topics: Vec<RecordedSubscription>,
     /// Topics that were given to the cache, also such as could not be heard.
     places: usize,
     /// Types of each name that is recorded or was refused, the recorded one first.
@@ -43,7 +43,7 @@ pub(super) struct Session {
 }
 
 /// A topic that is heard.
-pub(super) struct Heard {
+pub(super) struct RecordedSubscription {
     subscription: Subscription,
     ros_type: String,
     place: usize,
@@ -165,7 +165,7 @@ impl Session {
         let heard = self
             .node
             .subscribe_raw(topic, ros_type, qos, load, handler)?;
-        self.topics.push(Heard {
+        self.topics.push(RecordedSubscription {
             subscription: heard,
             ros_type: ros_type.to_owned(),
             place,
@@ -176,7 +176,7 @@ impl Session {
 
     /// Numbers of each topic, with its place.
     pub(super) fn report(&self) -> Vec<(usize, RecordedTopic)> {
-        let numbers = |topic: &Heard| RecordedTopic {
+        let numbers = |topic: &RecordedSubscription| RecordedTopic {
             name: topic.subscription.topic().to_owned(),
             type_name: topic.ros_type.clone(),
             heard: topic.subscription.received(),

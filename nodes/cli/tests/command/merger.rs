@@ -21,7 +21,7 @@ use lattice_runtime::{Load, LoopbackDomain, Node, Publisher, Runtime, Subscripti
 use crate::PATIENCE;
 use crate::record::{signal, start};
 
-enum Heard {
+enum MapEvent {
     Map(Arc<LatticeMap>),
     Update(Arc<LatticeMapUpdate>),
 }
@@ -29,7 +29,7 @@ enum Heard {
 /// A map of one namespace.
 struct Listener {
     follower: MapFollower,
-    heard: Receiver<Heard>,
+    heard: Receiver<MapEvent>,
     request: Publisher<lattice_msgs::std_msgs::Empty>,
     _subscriptions: [Subscription; 2],
 }
@@ -44,10 +44,10 @@ impl Listener {
         );
         let subscriptions = [
             node.subscribe(&map, Qos::MAP, Load::Small, move |m| {
-                drop(maps.send(Heard::Map(m)))
+                drop(maps.send(MapEvent::Map(m)))
             }),
             node.subscribe(&updates, Qos::DELTAS, Load::Small, move |m| {
-                drop(sender.send(Heard::Update(m)));
+                drop(sender.send(MapEvent::Update(m)));
             }),
         ];
         let asked = format!("{namespace}/{mapper}/request_keyframe");
@@ -64,8 +64,8 @@ impl Listener {
         let mut wait = Duration::from_millis(20);
         loop {
             let followed = match self.heard.recv_timeout(wait) {
-                Ok(Heard::Map(message)) => self.follower.on_map(&message),
-                Ok(Heard::Update(message)) => self.follower.on_update(&message),
+                Ok(MapEvent::Map(message)) => self.follower.on_map(&message),
+                Ok(MapEvent::Update(message)) => self.follower.on_update(&message),
                 Err(RecvTimeoutError::Timeout) => return,
                 Err(RecvTimeoutError::Disconnected) => panic!("the subscription has ended"),
             };

@@ -38,12 +38,12 @@ impl Source {
                 smol::future::yield_now().await;
             }
             match self.next(turn.is_multiple_of(2)).await {
-                Heard::Local(message) => give_shared(message, &mut handler),
-                Heard::Remote(Ok(())) => {
+                SubscriptionEvent::Local(message) => give_shared(message, &mut handler),
+                SubscriptionEvent::Remote(Ok(())) => {
                     handler(Sample::Cdr(&mut self.reader.bytes()));
                 }
-                Heard::Remote(Err(why)) => self.stats.not_decodable(&why),
-                Heard::WorkOff(done) => {
+                SubscriptionEvent::Remote(Err(why)) => self.stats.not_decodable(&why),
+                SubscriptionEvent::WorkOff(done) => {
                     for _ in 0..self.local.len() {
                         let message = self.local.try_recv();
                         message
@@ -52,16 +52,26 @@ impl Source {
                     }
                     drop(done);
                 }
-                Heard::End => return,
+                SubscriptionEvent::End => return,
             }
         }
     }
 
     /// Both sides get their turn, whichever has more to say.
-    async fn next(&self, local_first: bool) -> Heard {
-        let order = async { self.orders.recv().await.map_or(Heard::End, Heard::WorkOff) };
-        let local = async { self.local.recv().await.map_or(Heard::End, Heard::Local) };
-        let remote = async { Heard::Remote(self.reader.next().await.map(drop)) };
+    async fn next(&self, local_first: bool) -> SubscriptionEvent {
+        let order = async {
+            self.orders
+                .recv()
+                .await
+                .map_or(SubscriptionEvent::End, SubscriptionEvent::WorkOff)
+        };
+        let local = async {
+            self.local
+                .recv()
+                .await
+                .map_or(SubscriptionEvent::End, SubscriptionEvent::Local)
+        };
+        let remote = async { SubscriptionEvent::Remote(self.reader.next().await.map(drop)) };
         if local_first {
             or(order, or(local, remote)).await
         } else {
@@ -76,7 +86,7 @@ fn give_shared<M: Any + Send + Sync>(message: AnyMessage, handler: &mut impl FnM
     }
 }
 
-enum Heard {
+enum SubscriptionEvent {
     WorkOff(Sender<()>),
     Local(AnyMessage),
     Remote(Result<(), String>),
