@@ -8,7 +8,9 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Empty;
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Load, Losses, Node, Publisher, RuntimeError, Subscription, Undecoded};
+use lattice_runtime::{
+    Losses, Node, Publisher, RuntimeError, Subscription, SubscriptionExecutor, Undecoded,
+};
 
 use crate::compute::Inbox;
 use crate::map_follower::{FollowError, Followed};
@@ -52,9 +54,18 @@ impl MapLosses {
                 update.bytes(|update| update.keys.len() + update.counts.len() * 10)
             },
         );
-        let maps = node.subscribe_undecoded(map_topic.as_ref(), Qos::MAP, Load::Small, on_map)?;
-        let updates =
-            node.subscribe_undecoded(update_topic.as_ref(), Qos::DELTAS, Load::Small, on_update)?;
+        let maps = node.subscribe_undecoded(
+            map_topic.as_ref(),
+            Qos::MAP,
+            SubscriptionExecutor::Shared,
+            on_map,
+        )?;
+        let updates = node.subscribe_undecoded(
+            update_topic.as_ref(),
+            Qos::DELTAS,
+            SubscriptionExecutor::Shared,
+            on_update,
+        )?;
         self.before.watch([&maps, &updates]);
         node.expect_publishers([&maps], "lattice_mapper", None, |_| true);
         Ok([maps, updates])

@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Empty;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Load, Node, Publisher, RuntimeError, Server, Subscription};
+use lattice_runtime::{Node, Publisher, RuntimeError, Server, Subscription, SubscriptionExecutor};
 
 /// Chunks of a keyframe published in one update period: 3 MB.
 const CHUNKS_PER_ROUND: usize = 50;
@@ -54,7 +54,12 @@ impl MapOutput {
         let (by_topic, by_call) = (ask(), ask());
         let heard = move |_: Arc<Empty>| by_topic();
         let requests = KeyframeRequests {
-            topic: node.subscribe("~/request_keyframe", Qos::DEFAULT, Load::Small, heard)?,
+            topic: node.subscribe(
+                "~/request_keyframe",
+                Qos::DEFAULT,
+                SubscriptionExecutor::Shared,
+                heard,
+            )?,
             _service: node.service_trigger("~/request_keyframe", move || {
                 by_call();
                 (true, "keyframe follows".into())

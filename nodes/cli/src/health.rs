@@ -8,7 +8,7 @@ use clap::Args;
 use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Runtime, WORKING};
+use lattice_runtime::{Runtime, SubscriptionExecutor, WORKING};
 
 use super::{CliResult, init_logging};
 
@@ -53,7 +53,7 @@ impl Health {
         let _subscription = node.subscribe::<DiagnosticArray>(
             "/diagnostics",
             Qos::DIAGNOSTICS,
-            Load::Small,
+            SubscriptionExecutor::Shared,
             handler,
         )?;
         let deadline = Instant::now()

@@ -63,7 +63,7 @@ pub use remote::{GraphRole, RemotePublisher};
 pub use service::{Reply, Server};
 pub use shared::{CallError, Client};
 pub use shutdown::{Shutdown, catch_file_size_signal};
-pub use subscription::{Load, Losses, Subscription, Undecoded};
+pub use subscription::{Losses, Subscription, SubscriptionExecutor, Undecoded};
 pub use sync::lock;
 pub use task_thread::guarded;
 pub use tf::{StaticTfBroadcaster, TfBroadcaster};

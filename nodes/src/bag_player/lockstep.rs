@@ -6,7 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use lattice_runtime::qos::{Durability, Qos, Reliability};
-use lattice_runtime::{Load, Node, RemotePublisher, Subscription};
+use lattice_runtime::{Node, RemotePublisher, Subscription, SubscriptionExecutor};
 
 use super::playback::SLICE;
 use crate::start::NodeError;
@@ -105,7 +105,13 @@ impl Lockstep {
             };
             let of = publisher.type_name.as_str();
             let qos = qos_of(&publisher);
-            let subscription = node.subscribe_raw(&answers, of, qos, Load::Large, on_answer)?;
+            let subscription = node.subscribe_raw(
+                &answers,
+                of,
+                qos,
+                SubscriptionExecutor::Dedicated,
+                on_answer,
+            )?;
             let pair = Pair {
                 answers,
                 awaited,

@@ -2,7 +2,7 @@
 
 use lattice_bag::BagQos;
 use lattice_runtime::qos::{Durability, Qos, Reliability};
-use lattice_runtime::{Load, RemotePublisher};
+use lattice_runtime::{RemotePublisher, SubscriptionExecutor};
 
 /// Samples that wait in DDS: a burst of small ones, and not too much of 4 MB clouds.
 const SMALL_DEPTH: usize = 500;
@@ -13,7 +13,7 @@ const DEPTH: u64 = 100;
 const LATCHED_DEPTH: u64 = 500;
 
 /// The QoS of a subscription that hears all these publishers: reliable if all are, latched if all are.
-pub(super) fn subscription(publishers: &[&RemotePublisher], load: Load) -> Qos {
+pub(super) fn subscription(publishers: &[&RemotePublisher], executor: SubscriptionExecutor) -> Qos {
     let reliable = |p: &&RemotePublisher| p.reliability == Reliability::Reliable;
     let latched = |p: &&RemotePublisher| p.durability == Durability::TransientLocal;
     Qos {
@@ -25,9 +25,9 @@ pub(super) fn subscription(publishers: &[&RemotePublisher], load: Load) -> Qos {
             true => Durability::TransientLocal,
             false => Durability::Volatile,
         },
-        depth: match load {
-            Load::Small => SMALL_DEPTH,
-            Load::Large => LARGE_DEPTH,
+        depth: match executor {
+            SubscriptionExecutor::Shared => SMALL_DEPTH,
+            SubscriptionExecutor::Dedicated => LARGE_DEPTH,
         },
         kept: None,
     }
@@ -59,7 +59,7 @@ mod tests {
         };
         let [latched, reliable, sensor] = [Qos::LATCHED, Qos::DEFAULT, Qos::SENSOR].map(publisher);
         let heard = |publishers: &[&RemotePublisher]| {
-            let qos = subscription(publishers, Load::Small);
+            let qos = subscription(publishers, SubscriptionExecutor::Shared);
             (qos.reliability, qos.durability)
         };
         type R = Reliability;

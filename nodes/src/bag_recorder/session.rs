@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use lattice_bag::TopicSpec;
 use lattice_runtime::qos::Durability;
-use lattice_runtime::{Load, Node, RemotePublisher, RuntimeError, Subscription};
+use lattice_runtime::{Node, RemotePublisher, RuntimeError, Subscription, SubscriptionExecutor};
 
 use super::RecordedTopic;
 use super::cache::{Cache, Item};
@@ -148,9 +148,9 @@ impl Session {
                 });
             }
         };
-        let load = match LARGE.contains(&ros_type) {
-            true => Load::Large,
-            false => Load::Small,
+        let executor = match LARGE.contains(&ros_type) {
+            true => SubscriptionExecutor::Dedicated,
+            false => SubscriptionExecutor::Shared,
         };
         // First, so that the topic is in the bag before its messages.
         self.places += 1;
@@ -161,10 +161,10 @@ impl Session {
             definition: defined.map(|(text, _)| text),
             offered_qos: publishers.iter().map(|p| offered::noted(p)).collect(),
         }));
-        let qos = offered::subscription(publishers, load);
+        let qos = offered::subscription(publishers, executor);
         let heard = self
             .node
-            .subscribe_raw(topic, ros_type, qos, load, handler)?;
+            .subscribe_raw(topic, ros_type, qos, executor, handler)?;
         self.topics.push(RecordedSubscription {
             subscription: heard,
             ros_type: ros_type.to_owned(),

@@ -22,8 +22,8 @@ use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    Clock, Diagnostics, Level, Load, Losses, Node, Publisher, Runtime, StaticTfBroadcaster,
-    Subscription, TfBroadcaster,
+    Clock, Diagnostics, Level, Losses, Node, Publisher, Runtime, StaticTfBroadcaster, Subscription,
+    SubscriptionExecutor, TfBroadcaster,
 };
 
 /// Event for the compute thread.
@@ -86,7 +86,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         let name: Arc<str> = topic.as_str().into();
         let event = move |cloud| Event::Cloud(Arc::clone(&name), cloud);
         let hand_over = inbox.counting(&lost, event, |cloud| cloud::bytes_of(cloud));
-        clouds.push(node.subscribe(&topic, Qos::SCANS, Load::Large, hand_over)?);
+        clouds.push(node.subscribe(
+            &topic,
+            Qos::SCANS,
+            SubscriptionExecutor::Dedicated,
+            hand_over,
+        )?);
     }
     lost_clouds.watch(&clouds);
     let is_raw = |topic: &str| !topic.ends_with("/points_enu") && !topic.ends_with("/map_centers");
@@ -168,7 +173,7 @@ impl PoseInbox {
                 }
             }
         };
-        Ok(node.subscribe(topic, qos, Load::Small, handler)?)
+        Ok(node.subscribe(topic, qos, SubscriptionExecutor::Shared, handler)?)
     }
 }
 

@@ -25,7 +25,9 @@ use crate::segmenter::{self, LoadedNetwork, NetworkEvent, NetworkView, Worker};
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Losses, Node, Publisher, Runtime, Subscription};
+use lattice_runtime::{
+    Diagnostics, Level, Losses, Node, Publisher, Runtime, Subscription, SubscriptionExecutor,
+};
 
 /// Event for the compute thread.
 enum Event {
@@ -140,19 +142,29 @@ fn subscribe(
     let marker = inbox.counting(lost, Event::Marker, |marker| 24 * marker.points.len());
     let session = inbox.counting(lost, Event::Session, |session| session.data.len());
     let mut inputs = vec![
-        node.subscribe("headset/mesh", Qos::reliable(1000), Load::Large, mesh)?,
+        node.subscribe(
+            "headset/mesh",
+            Qos::reliable(1000),
+            SubscriptionExecutor::Dedicated,
+            mesh,
+        )?,
         node.subscribe(
             "headset/mesh_marker",
             Qos::reliable(1000),
-            Load::Large,
+            SubscriptionExecutor::Dedicated,
             marker,
         )?,
-        node.subscribe("headset/session", Qos::LATCHED, Load::Small, session)?,
+        node.subscribe(
+            "headset/session",
+            Qos::LATCHED,
+            SubscriptionExecutor::Shared,
+            session,
+        )?,
     ];
     if settings.network.is_none() {
         let names = inbox.counting(lost, Event::LabelInfo, |_| 0);
         let topic = "headset/labels/label_info";
-        inputs.push(node.subscribe(topic, Qos::LATCHED, Load::Small, names)?);
+        inputs.push(node.subscribe(topic, Qos::LATCHED, SubscriptionExecutor::Shared, names)?);
     }
     if options.labels_from == LabelsFrom::Mesh {
         return Ok(inputs);
@@ -161,27 +173,52 @@ fn subscribe(
     if settings.network.is_none() {
         let labels = |image| Event::Image(HeadsetStream::Labels, image);
         let labels = inbox.counting(lost, labels, bytes);
-        inputs.push(node.subscribe("headset/labels/image", Qos::SENSOR, Load::Large, labels)?);
+        inputs.push(node.subscribe(
+            "headset/labels/image",
+            Qos::SENSOR,
+            SubscriptionExecutor::Dedicated,
+            labels,
+        )?);
     }
     if options.use_confidence {
         let confidence = |image| Event::Image(HeadsetStream::Confidence, image);
         let confidence = inbox.counting(lost, confidence, bytes);
         let topic = "headset/labels/confidence";
-        inputs.push(node.subscribe(topic, Qos::SENSOR, Load::Large, confidence)?);
+        inputs.push(node.subscribe(
+            topic,
+            Qos::SENSOR,
+            SubscriptionExecutor::Dedicated,
+            confidence,
+        )?);
     }
     let camera = inbox.counting(lost, Event::CameraInfo, |_| 0);
-    inputs.push(node.subscribe("headset/camera_info", Qos::SENSOR, Load::Small, camera)?);
+    inputs.push(node.subscribe(
+        "headset/camera_info",
+        Qos::SENSOR,
+        SubscriptionExecutor::Shared,
+        camera,
+    )?);
     match options.poses {
         PoseSource::Topic => {
             let pose = inbox.counting(lost, Event::Pose, |_| 0);
-            inputs.push(node.subscribe("headset/pose", Qos::INS, Load::Small, pose)?);
+            inputs.push(node.subscribe(
+                "headset/pose",
+                Qos::INS,
+                SubscriptionExecutor::Shared,
+                pose,
+            )?);
         }
         PoseSource::Tf => {
             let moving = inbox.counting(lost, |m| Event::Transforms(m, false), |_| 0);
-            inputs.push(node.subscribe("/tf", Qos::TF, Load::Small, moving)?);
+            inputs.push(node.subscribe("/tf", Qos::TF, SubscriptionExecutor::Shared, moving)?);
             let fixed = inbox.counting(lost, |m| Event::Transforms(m, true), |_| 0);
             let latched = Qos::TF_STATIC_LISTENER;
-            inputs.push(node.subscribe("/tf_static", latched, Load::Small, fixed)?);
+            inputs.push(node.subscribe(
+                "/tf_static",
+                latched,
+                SubscriptionExecutor::Shared,
+                fixed,
+            )?);
         }
     }
     Ok(inputs)

@@ -24,7 +24,7 @@ use crate::report;
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Losses, Runtime, WORKING, lock};
+use lattice_runtime::{Diagnostics, Level, Losses, Runtime, SubscriptionExecutor, WORKING, lock};
 
 /// Said where rays shall clear voxels and a cloud does not say where they begin.
 const NO_VIEWPOINTS: &str = "no sensor positions (vp_x, vp_y, vp_z), so no free space: set `viewpoints: true` of enu_transformer";
@@ -89,15 +89,30 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     )?;
     let inbox = compute.inbox();
     let hand_over = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
-    let points = node.subscribe("points_enu", Qos::SCANS, Load::Large, hand_over)?;
+    let points = node.subscribe(
+        "points_enu",
+        Qos::SCANS,
+        SubscriptionExecutor::Dedicated,
+        hand_over,
+    )?;
     let origins = Arc::clone(&wishes);
     let take = move |origin| *lock(&origins.origin) = Some(origin);
-    let origins = node.subscribe("map_origin", Qos::LATCHED, Load::Small, take)?;
+    let origins = node.subscribe(
+        "map_origin",
+        Qos::LATCHED,
+        SubscriptionExecutor::Shared,
+        take,
+    )?;
     let names = match old.payload().labels {
         true => {
             let maps = maps.clone();
             let take = move |info: Arc<LabelInfo>| maps.name_labels(&info);
-            Some(node.subscribe("label_info", Qos::LATCHED, Load::Small, take)?)
+            Some(node.subscribe(
+                "label_info",
+                Qos::LATCHED,
+                SubscriptionExecutor::Shared,
+                take,
+            )?)
         }
         false => None,
     };

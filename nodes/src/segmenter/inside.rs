@@ -13,7 +13,7 @@ use crate::report;
 use crate::start::NodeError;
 use lattice_runtime::params::{ParamError, Params};
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Node, Shutdown, Subscription};
+use lattice_runtime::{Diagnostics, Level, Node, Shutdown, Subscription, SubscriptionExecutor};
 
 /// A network that is ready to work.
 pub(crate) struct LoadedNetwork {
@@ -65,10 +65,10 @@ pub(super) fn subscribe(
     Ok(if is_compressed {
         let topic = format!("{topic}/compressed");
         let enter = move |image| enter(Input::Compressed(image));
-        node.subscribe(&topic, Qos::SENSOR, Load::Large, enter)?
+        node.subscribe(&topic, Qos::SENSOR, SubscriptionExecutor::Dedicated, enter)?
     } else {
         let enter = move |image| enter(Input::Plain(image));
-        node.subscribe(topic, Qos::SENSOR, Load::Large, enter)?
+        node.subscribe(topic, Qos::SENSOR, SubscriptionExecutor::Dedicated, enter)?
     })
 }
 

@@ -17,7 +17,9 @@ use crate::segmenter::{self, LoadedNetwork, NetworkEvent, Worker};
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Losses, Node, Publisher, Runtime, Subscription};
+use lattice_runtime::{
+    Diagnostics, Level, Losses, Node, Publisher, Runtime, Subscription, SubscriptionExecutor,
+};
 
 /// Most depth images whose arrival is remembered.
 const MAX_ARRIVALS: usize = 256;
@@ -129,31 +131,61 @@ fn subscribe(
         let event = |image| Event::CompressedDepth(image, Instant::now());
         let depth = inbox.counting(lost, event, packed);
         let topic = format!("{topic}/compressedDepth");
-        node.subscribe(&topic, Qos::SENSOR, Load::Large, depth)?
+        node.subscribe(&topic, Qos::SENSOR, SubscriptionExecutor::Dedicated, depth)?
     } else {
-        node.subscribe(topic, Qos::SENSOR, Load::Large, images(Stream::Depth))?
+        node.subscribe(
+            topic,
+            Qos::SENSOR,
+            SubscriptionExecutor::Dedicated,
+            images(Stream::Depth),
+        )?
     }];
     if settings.network.is_none() {
         let labels = images(Stream::Labels);
-        inputs.push(node.subscribe("labels/image", Qos::SENSOR, Load::Large, labels)?);
+        inputs.push(node.subscribe(
+            "labels/image",
+            Qos::SENSOR,
+            SubscriptionExecutor::Dedicated,
+            labels,
+        )?);
         let names = inbox.counting(lost, Event::LabelInfo, |_| 0);
-        inputs.push(node.subscribe("labels/label_info", Qos::LATCHED, Load::Small, names)?);
+        inputs.push(node.subscribe(
+            "labels/label_info",
+            Qos::LATCHED,
+            SubscriptionExecutor::Shared,
+            names,
+        )?);
     }
     if settings.cloud.pair.with_confidence {
         let confidence = images(Stream::Confidence);
-        inputs.push(node.subscribe("labels/confidence", Qos::SENSOR, Load::Large, confidence)?);
+        inputs.push(node.subscribe(
+            "labels/confidence",
+            Qos::SENSOR,
+            SubscriptionExecutor::Dedicated,
+            confidence,
+        )?);
     }
     if settings.cloud.pair.with_color {
         inputs.push(if settings.compressed_color {
             let color = inbox.counting(lost, Event::CompressedColor, packed);
             let topic = format!("{COLOR}/compressed");
-            node.subscribe(&topic, Qos::SENSOR, Load::Large, color)?
+            node.subscribe(&topic, Qos::SENSOR, SubscriptionExecutor::Dedicated, color)?
         } else {
-            node.subscribe(COLOR, Qos::SENSOR, Load::Large, images(Stream::Color))?
+            node.subscribe(
+                COLOR,
+                Qos::SENSOR,
+                SubscriptionExecutor::Dedicated,
+                images(Stream::Color),
+            )?
         });
     }
     let camera = inbox.counting(lost, Event::CameraInfo, |_| 0);
-    inputs.push(node.subscribe("rgb/camera_info", Qos::SENSOR, Load::Small, camera)?);
+    inputs.push(node.subscribe(
+        "rgb/camera_info",
+        Qos::SENSOR,
+        SubscriptionExecutor::Shared,
+        camera,
+    )?);
     Ok(inputs)
 }
 

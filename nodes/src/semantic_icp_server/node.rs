@@ -23,11 +23,11 @@ use crate::compute::{Compute, Inbox};
 use crate::convert::cloud;
 use crate::report;
 use crate::start::{Finish, NodeError, handed_over, open_params};
+use lattice_runtime::SubscriptionExecutor::{Dedicated, Shared};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Load, Losses, Reply, Runtime,
-    Undecoded, lock,
+    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Losses, Reply, Runtime, Undecoded, lock,
 };
 
 /// Between two messages on diagnostics.
@@ -105,7 +105,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             part.store(true, Ordering::Relaxed);
         }
     };
-    let maps = node.subscribe_undecoded("map", Qos::MAP, Load::Small, on_map)?;
+    let maps = node.subscribe_undecoded("map", Qos::MAP, Shared, on_map)?;
     let (to, missed, part) = (inbox.clone(), Arc::clone(&lost), map_lost);
     let on_update = move |update: Undecoded<LatticeMapUpdate>| {
         let bytes = update.bytes(|update| {
@@ -115,13 +115,13 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             part.store(true, Ordering::Relaxed);
         }
     };
-    let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Load::Small, on_update)?;
+    let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Shared, on_update)?;
     let on_cloud = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
-    let clouds = node.subscribe("headset/points", Qos::SENSOR, Load::Large, on_cloud)?;
+    let clouds = node.subscribe("headset/points", Qos::SENSOR, Dedicated, on_cloud)?;
     let on_session = inbox.counting(&lost, Event::Session, |_| 0);
-    let sessions = node.subscribe("headset/session", Qos::LATCHED, Load::Small, on_session)?;
+    let sessions = node.subscribe("headset/session", Qos::LATCHED, Shared, on_session)?;
     let on_info = inbox.counting(&lost, Event::LabelInfo, |_| 0);
-    let infos = node.subscribe("headset/label_info", Qos::LATCHED, Load::Small, on_info)?;
+    let infos = node.subscribe("headset/label_info", Qos::LATCHED, Shared, on_info)?;
 
     losses.watch([&maps, &updates, &clouds, &sessions, &infos]);
     // A headset comes when its wearer does.

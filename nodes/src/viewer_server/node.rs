@@ -26,7 +26,7 @@ use crate::report;
 use crate::start::{Finish, NodeError, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Node, Runtime, Undecoded};
+use lattice_runtime::{Diagnostics, Level, Node, Runtime, SubscriptionExecutor, Undecoded};
 
 /// Event for the compute thread.
 enum Event {
@@ -110,7 +110,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         Event::FixedTransforms,
         |fixed: &Arc<TFMessage>| fixed.transforms.len() * 100,
     );
-    let fixed = node.subscribe("/tf_static", Qos::TF_STATIC_LISTENER, Load::Small, on_fixed)?;
+    let fixed = node.subscribe(
+        "/tf_static",
+        Qos::TF_STATIC_LISTENER,
+        SubscriptionExecutor::Shared,
+        on_fixed,
+    )?;
     let period = |viewer: &ViewerOptions| Duration::from_secs_f64(viewer.update_period_s);
     let ticks = runtime.timer(period(&viewer), move || {
         let _ = inbox.send(Event::Tick, 0);

@@ -15,7 +15,7 @@ use lattice_msgs::vision_msgs::LabelInfo;
 use lattice_msgs::visualization_msgs::MarkerArray;
 use lattice_msgs::{RosMessage, cdr};
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Load, Node, RuntimeError, Subscription};
+use lattice_runtime::{Node, RuntimeError, Subscription, SubscriptionExecutor};
 
 use super::hub::{Demand, Hub};
 use super::options::ViewerOptions;
@@ -77,7 +77,7 @@ impl<E: FromChannel> Builder<'_, E> {
     fn add<M: RosMessage>(
         &mut self,
         topic: &str,
-        (qos, load): (Qos, Load),
+        (qos, executor): (Qos, SubscriptionExecutor),
         depth: usize,
         when: When,
     ) -> Result<(), RuntimeError> {
@@ -91,7 +91,7 @@ impl<E: FromChannel> Builder<'_, E> {
             when,
             subscribe: Box::new(move || {
                 let (inbox, lost) = (inbox.clone(), Arc::clone(&lost));
-                node.subscribe_undecoded::<M>(&topic, qos, load, move |message| {
+                node.subscribe_undecoded::<M>(&topic, qos, executor, move |message| {
                     let bytes = message.bytes(|_| 4096);
                     let event = E::message(channel, Box::new(move || message.into_cdr()));
                     let fits = bytes <= MAX_MESSAGE_BYTES && inbox.send(event, bytes);
@@ -123,22 +123,27 @@ impl Sources {
             inbox,
             sources,
         };
-        let small = |qos| (qos, Load::Small);
-        let large = |qos| (qos, Load::Large);
-        builder.add::<TFMessage>("/tf", small(Qos::TF), 100, When::Always)?;
+        let shared = |qos| (qos, SubscriptionExecutor::Shared);
+        let dedicated = |qos| (qos, SubscriptionExecutor::Dedicated);
+        builder.add::<TFMessage>("/tf", shared(Qos::TF), 100, When::Always)?;
         builder.add::<DiagnosticArray>(
             "/diagnostics",
-            small(Qos::DIAGNOSTICS),
+            shared(Qos::DIAGNOSTICS),
             20,
             When::Always,
         )?;
-        builder.add::<CalibrationResult>("calibration", small(Qos::LATCHED), 1, When::Always)?;
-        builder.add::<LabelInfo>("label_info", small(Qos::LATCHED), 1, When::Always)?;
-        builder.add::<PointCloud2>("map_centers", large(Qos::MARKERS), 1, When::Wanted)?;
-        builder.add::<MarkerArray>("voxel_markers", large(Qos::MARKERS), 1000, When::EachAnew)?;
-        builder.add::<LatticeMap>("free", large(Qos::MAP), 1000, When::EachAnew)?;
+        builder.add::<CalibrationResult>("calibration", shared(Qos::LATCHED), 1, When::Always)?;
+        builder.add::<LabelInfo>("label_info", shared(Qos::LATCHED), 1, When::Always)?;
+        builder.add::<PointCloud2>("map_centers", dedicated(Qos::MARKERS), 1, When::Wanted)?;
+        builder.add::<MarkerArray>(
+            "voxel_markers",
+            dedicated(Qos::MARKERS),
+            1000,
+            When::EachAnew,
+        )?;
+        builder.add::<LatticeMap>("free", dedicated(Qos::MAP), 1000, When::EachAnew)?;
         for topic in &options.cloud_topics {
-            builder.add::<PointCloud2>(topic, large(Qos::SCANS), 20, When::Wanted)?;
+            builder.add::<PointCloud2>(topic, dedicated(Qos::SCANS), 20, When::Wanted)?;
         }
         Ok(builder.sources)
     }

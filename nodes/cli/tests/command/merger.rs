@@ -16,7 +16,9 @@ use lattice_nodes::map_follower::{Followed, MapFollower};
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Node, Publisher, Runtime, Subscription};
+use lattice_runtime::{
+    LoopbackDomain, Node, Publisher, Runtime, Subscription, SubscriptionExecutor,
+};
 
 use crate::PATIENCE;
 use crate::record::{signal, start};
@@ -43,12 +45,17 @@ impl Listener {
             format!("{namespace}/map_updates"),
         );
         let subscriptions = [
-            node.subscribe(&map, Qos::MAP, Load::Small, move |m| {
+            node.subscribe(&map, Qos::MAP, SubscriptionExecutor::Shared, move |m| {
                 drop(maps.send(MapEvent::Map(m)))
             }),
-            node.subscribe(&updates, Qos::DELTAS, Load::Small, move |m| {
-                drop(sender.send(MapEvent::Update(m)));
-            }),
+            node.subscribe(
+                &updates,
+                Qos::DELTAS,
+                SubscriptionExecutor::Shared,
+                move |m| {
+                    drop(sender.send(MapEvent::Update(m)));
+                },
+            ),
         ];
         let asked = format!("{namespace}/{mapper}/request_keyframe");
         Self {
@@ -194,7 +201,12 @@ fn the_map_of_two_robots_stays_exact_when_one_begins_anew() {
     let (told, names_told) = channel();
     let told = move |info: Arc<LabelInfo>| drop(told.send(info));
     let _info = node
-        .subscribe("/label_info", Qos::LATCHED, Load::Small, told)
+        .subscribe(
+            "/label_info",
+            Qos::LATCHED,
+            SubscriptionExecutor::Shared,
+            told,
+        )
         .unwrap();
     let info = names_told.recv_timeout(PATIENCE).unwrap();
     let info = info.class_map.iter();

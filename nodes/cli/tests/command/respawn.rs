@@ -18,7 +18,7 @@ use lattice_nodes::map_follower::{Followed, MapFollower};
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Publisher, Runtime, Subscription};
+use lattice_runtime::{LoopbackDomain, Publisher, Runtime, Subscription, SubscriptionExecutor};
 
 use crate::PATIENCE;
 use crate::nodes::simulated;
@@ -107,12 +107,17 @@ impl Viewer {
         let (sender, heard) = channel();
         let maps = sender.clone();
         let subscriptions = [
-            node.subscribe("map", Qos::MAP, Load::Small, move |m| {
+            node.subscribe("map", Qos::MAP, SubscriptionExecutor::Shared, move |m| {
                 drop(maps.send(MapEvent::Map(m)))
             }),
-            node.subscribe("map_updates", Qos::DELTAS, Load::Small, move |m| {
-                drop(sender.send(MapEvent::Update(m)));
-            }),
+            node.subscribe(
+                "map_updates",
+                Qos::DELTAS,
+                SubscriptionExecutor::Shared,
+                move |m| {
+                    drop(sender.send(MapEvent::Update(m)));
+                },
+            ),
         ];
         Self {
             follower: MapFollower::new(usize::MAX),

@@ -18,7 +18,7 @@ use lattice_nodes::viewer_server::{Class, Entry, Gate, Hub, Server};
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Runtime};
+use lattice_runtime::{LoopbackDomain, Runtime, SubscriptionExecutor};
 use serde_bytes::ByteBuf;
 use serde_json::{Map, Value, to_value};
 
@@ -219,7 +219,12 @@ fn the_protocols_own_client_sees_nodes_elsewhere_come_and_go() {
     let node = runtime.node("peer").unwrap();
     let ours = node.publisher::<std_msgs::Empty>("/from_peer", Qos::DEFAULT);
     let heard = |_: Arc<std_msgs::Empty>| {};
-    let theirs = node.subscribe("/to_peer", Qos::DEFAULT, Load::Small, heard);
+    let theirs = node.subscribe(
+        "/to_peer",
+        Qos::DEFAULT,
+        SubscriptionExecutor::Shared,
+        heard,
+    );
     assert!(ours.is_ok() && theirs.is_ok());
     let peer = ["/robot/peer"].as_slice();
     follow(lines, &mut known, |known| {

@@ -22,7 +22,7 @@ use super::qos::{Durability, Qos};
 use super::remote::RemotePublisher;
 use super::ros_args::RosArgs;
 use super::shared::{DEFAULT_MAX_MESSAGE_BYTES, Shared};
-use super::subscription::{Load, Sample, Stats, Subscription, Undecoded};
+use super::subscription::{Sample, Stats, Subscription, SubscriptionExecutor, Undecoded};
 
 /// Least `max_message_bytes`: an Odometry takes 720 bytes, so that below it no pose would be taken.
 const MIN_MESSAGE_BYTES: usize = 1000;
@@ -214,10 +214,10 @@ impl Node {
         &self,
         topic: &str,
         qos: Qos,
-        load: Load,
+        executor: SubscriptionExecutor,
         mut handler: impl FnMut(Arc<M>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
-        self.subscribe_samples(topic, qos, load, move |sample, stats| {
+        self.subscribe_samples(topic, qos, executor, move |sample, stats| {
             if let Some(message) = stats.decode(sample) {
                 handler(message);
             }
@@ -230,10 +230,10 @@ impl Node {
         &self,
         topic: &str,
         qos: Qos,
-        load: Load,
+        executor: SubscriptionExecutor,
         mut handler: impl FnMut(Undecoded<M>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
-        self.subscribe_samples(topic, qos, load, move |sample, stats| {
+        self.subscribe_samples(topic, qos, executor, move |sample, stats| {
             handler(Undecoded::new(sample, stats));
         })
     }
@@ -245,14 +245,14 @@ impl Node {
         resolved_topic: &str,
         type_name: &str,
         qos: Qos,
-        load: Load,
+        executor: SubscriptionExecutor,
         handler: impl FnMut(Vec<u8>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         names::validate_full_name(resolved_topic)?;
         let (of, max) = ((resolved_topic, type_name), self.inner.max_message_bytes);
         self.inner
             .shared
-            .subscribe_raw(self.id(), of, &qos, load, max, handler)
+            .subscribe_raw(self.id(), of, &qos, executor, max, handler)
     }
 
     /// Publishers in other processes that are known by now, on any topic.
@@ -270,7 +270,7 @@ impl Node {
         &self,
         topic: &str,
         qos: Qos,
-        load: Load,
+        executor: SubscriptionExecutor,
         mut handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         let resolved = self.resolve(topic)?;
@@ -286,7 +286,7 @@ impl Node {
         };
         self.inner
             .shared
-            .subscribe(self.id(), &resolved, &qos, load, max, handler)
+            .subscribe(self.id(), &resolved, &qos, executor, max, handler)
     }
 }
 

@@ -36,7 +36,7 @@ use super::rmw_zenoh::Zenoh;
 use super::security::Enclave;
 use super::service::{Answers, LocalServices, Server, Unanswered};
 use super::shutdown::Shutdown;
-use super::subscription::{Intake, Load, Sample, Stats, Subscription};
+use super::subscription::{Intake, Sample, Stats, Subscription, SubscriptionExecutor};
 use super::sync::{lock, wait_for};
 use super::task_thread::TaskThread;
 
@@ -224,8 +224,14 @@ impl Shared {
                 now_ns.store(message.clock.to_ns(), Relaxed);
             }
         };
-        let subscription =
-            self.subscribe(node, topic, &Qos::CLOCK, Load::Small, 1 << 10, handler)?;
+        let subscription = self.subscribe(
+            node,
+            topic,
+            &Qos::CLOCK,
+            SubscriptionExecutor::Shared,
+            1 << 10,
+            handler,
+        )?;
         *sim = Some((Arc::clone(&shown), subscription));
         Ok(shown)
     }

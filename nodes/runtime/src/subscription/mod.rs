@@ -27,13 +27,13 @@ use super::task_thread::guarded;
 /// Between two warnings of undecodable samples.
 const WARNING_PERIOD: Duration = Duration::from_secs(5);
 
-/// Size of the messages of a subscription, which decides the thread that takes them.
+/// Thread that executes the handler of a subscription.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Load {
-    /// Poses, transforms, clocks: taken on the io thread.
-    Small,
-    /// Clouds, images: taken on a thread of their own.
-    Large,
+pub enum SubscriptionExecutor {
+    /// The io thread, shared by all: for poses, transforms, clocks.
+    Shared,
+    /// A thread of its own: for clouds, images.
+    Dedicated,
 }
 
 /// A subscription; dropping it ends it.

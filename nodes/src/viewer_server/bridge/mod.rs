@@ -15,7 +15,7 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::rcl_interfaces::ParameterEvent;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{CallError, Load, Node, Publisher, Subscription};
+use lattice_runtime::{CallError, Node, Publisher, Subscription, SubscriptionExecutor};
 
 pub use self::headset::HeadsetTopics;
 use self::parameters::Parameters;
@@ -133,7 +133,12 @@ impl NodeBridge {
                 }
             };
             let qos = Qos::PARAMETER_EVENTS;
-            events = Some(node.subscribe("/parameter_events", qos, Load::Small, tell)?);
+            events = Some(node.subscribe(
+                "/parameter_events",
+                qos,
+                SubscriptionExecutor::Shared,
+                tell,
+            )?);
         }
         let bridge = Self {
             offer,

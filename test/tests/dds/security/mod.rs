@@ -16,7 +16,7 @@ use lattice_nodes::executables;
 use lattice_runtime::env::Network;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::security::{self, Security};
-use lattice_runtime::{Load, Runtime, RuntimeError, lock};
+use lattice_runtime::{Runtime, RuntimeError, SubscriptionExecutor, lock};
 use lattice_test::domain::TestDomain;
 use lattice_test::python::{python, script};
 
@@ -208,7 +208,7 @@ fn the_nodes_run_with_the_permissions_of_the_manual_and_with_no_others() {
         assert!(other.contains("Not Allowed By Security"), "{other}");
         let handler = |_: Arc<RosString>| {};
         assert!(
-            node.subscribe("/camera", QOS, Load::Small, handler)
+            node.subscribe("/camera", QOS, SubscriptionExecutor::Shared, handler)
                 .is_err()
         );
         drop(node);
