@@ -10,7 +10,7 @@ use std::thread::{self, JoinHandle};
 use crossbeam_channel::{Sender, bounded};
 
 use lattice_runtime::Shutdown;
-use lattice_runtime::guarded;
+use lattice_runtime::run_catching_panics;
 
 /// Bounds of a compute thread.
 #[derive(Clone, Copy, Debug)]
@@ -78,7 +78,7 @@ impl<E: Send + 'static> Compute<E> {
         let thread = thread::Builder::new()
             .name(format!("{name} compute"))
             .spawn(move || {
-                guarded("compute", &shutdown, || {
+                run_catching_panics("compute", &shutdown, || {
                     while let Ok(Some((event, size))) = receiver.recv() {
                         if stop.load(Ordering::Acquire) {
                             break;

@@ -65,6 +65,6 @@ pub use shared::{CallError, Client};
 pub use shutdown::{Shutdown, catch_file_size_signal};
 pub use subscription::{Losses, Subscription, SubscriptionExecutor, Undecoded};
 pub use sync::lock;
-pub use task_thread::guarded;
+pub use task_thread::run_catching_panics;
 pub use tf::{StaticTfBroadcaster, TfBroadcaster};
 pub use timer::Timer;

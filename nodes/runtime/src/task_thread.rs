@@ -29,7 +29,7 @@ impl TaskThread {
         let thread = std::thread::Builder::new()
             .name(name.to_owned())
             .spawn(move || {
-                guarded(name, &for_thread, || run(&runner, &stopped));
+                run_catching_panics(name, &for_thread, || run(&runner, &stopped));
             })?;
         Ok(Self {
             name,
@@ -82,7 +82,7 @@ fn run(executor: &Executor<'static>, stopped: &Receiver<()>) {
 }
 
 /// Runs the body of a thread; a panic asks the process to shut down instead of passing unseen.
-pub fn guarded(name: &'static str, shutdown: &Shutdown, body: impl FnOnce()) {
+pub fn run_catching_panics(name: &'static str, shutdown: &Shutdown, body: impl FnOnce()) {
     if catch_unwind(AssertUnwindSafe(body)).is_err() {
         report_panic(name, shutdown);
     }

@@ -22,7 +22,7 @@ use super::peers::Peers;
 use super::port::ReaderLosses;
 use super::shutdown::Shutdown;
 use super::sync::lock;
-use super::task_thread::guarded;
+use super::task_thread::run_catching_panics;
 
 /// Between two warnings of undecodable samples.
 const WARNING_PERIOD: Duration = Duration::from_secs(5);
@@ -265,7 +265,7 @@ pub(crate) fn spawn_reader(
     let thread = std::thread::Builder::new()
         .name("reader".to_owned())
         .spawn(move || {
-            guarded("reader", &shutdown, || {
+            run_catching_panics("reader", &shutdown, || {
                 smol::future::block_on(smol::future::or(task, async {
                     // Ends when the sender closes.
                     let _ = stopped.recv().await;
