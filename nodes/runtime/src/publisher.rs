@@ -9,8 +9,8 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::cdr;
 
 use super::error::PublishError;
-use super::gate::Gate;
 use super::graph::NodeEndpoint;
+use super::lifecycle_gate::LifecycleGate;
 use super::local_bus::LocalEndpoint;
 use super::outbox::{Outbox, Serialize};
 use super::peers::Peers;
@@ -95,7 +95,7 @@ impl PublisherParts {
 pub struct Publisher<M> {
     pub(crate) parts: Arc<PublisherParts>,
     /// The gate of a managed node.
-    pub(crate) gate: Option<Arc<Gate>>,
+    pub(crate) gate: Option<Arc<LifecycleGate>>,
     pub(crate) message: PhantomData<fn(M)>,
 }
 

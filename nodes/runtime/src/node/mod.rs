@@ -11,8 +11,8 @@ use self::expected::Expected;
 use super::clock::Clock;
 use super::diagnostics::Diagnostics;
 use super::error::RuntimeError;
-use super::gate::Gate;
 use super::graph::NodeId;
+use super::lifecycle_gate::LifecycleGate;
 use super::names::{self, NameKind};
 use super::neighbours::GraphEndpoint;
 use super::outbox::WhenFull;
@@ -43,7 +43,7 @@ struct Inner {
     params: Arc<Params>,
     clock: Clock,
     max_message_bytes: usize,
-    gate: Arc<Gate>,
+    gate: Arc<LifecycleGate>,
     expected: Arc<Expected>,
 }
 
@@ -95,7 +95,7 @@ impl Node {
     }
 
     /// The gate in front of its topics.
-    pub(crate) fn gate(&self) -> &Gate {
+    pub(crate) fn gate(&self) -> &LifecycleGate {
         &self.inner.gate
     }
 

@@ -8,12 +8,12 @@ use crate::peers::Peers;
 use crate::sync::lock;
 
 /// The gate in front of the topics of a node; open unless the node is managed.
-pub(crate) struct Gate {
+pub(crate) struct LifecycleGate {
     open: AtomicBool,
     publishers: Mutex<Vec<Weak<Peers>>>,
 }
 
-impl Default for Gate {
+impl Default for LifecycleGate {
     fn default() -> Self {
         Self {
             open: AtomicBool::new(true),
@@ -22,7 +22,7 @@ impl Default for Gate {
     }
 }
 
-impl Gate {
+impl LifecycleGate {
     pub(crate) fn is_open(&self) -> bool {
         self.open.load(Relaxed)
     }
