@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, Weak};
 use futures::StreamExt;
 use futures::stream::BoxStream;
 
-use super::neighbours::Neighbours;
+use super::discovered_graph::DiscoveredGraph;
 use super::peers::Peers;
 use super::port::{EndpointId, PortEvent};
 use super::remote::{GraphRole, RemotePublisher};
@@ -23,7 +23,7 @@ const MAX_REMOTES: usize = 8192;
 #[derive(Default)]
 pub(crate) struct Endpoints {
     pub remotes: Remotes,
-    pub neighbours: Neighbours,
+    pub discovered_graph: DiscoveredGraph,
     inner: Mutex<Inner>,
 }
 
@@ -76,7 +76,7 @@ impl Endpoints {
                 node,
             } => {
                 let (role, topic) = (GraphRole::Publisher, &publisher.topic);
-                self.neighbours.add(peer, role, topic, node);
+                self.discovered_graph.add(peer, role, topic, node);
                 return self.remotes.add(peer, *publisher);
             }
             PortEvent::FoundOther {
@@ -84,7 +84,7 @@ impl Endpoints {
                 role,
                 name,
                 node,
-            } => return self.neighbours.add(peer, role, &name, node),
+            } => return self.discovered_graph.add(peer, role, &name, node),
             PortEvent::Lost { peer: lost } => return self.lost(|peer| *peer == lost),
         };
         let change = Change { peer, incompatible };
@@ -105,7 +105,7 @@ impl Endpoints {
 
     fn lost(&self, gone: impl Fn(&EndpointId) -> bool) {
         self.remotes.remove(&gone);
-        self.neighbours.remove(&gone);
+        self.discovered_graph.remove(&gone);
         let mut inner = lock(&self.inner);
         inner.early.retain(|(_, change)| !gone(&change.peer));
         let all: Vec<Arc<Peers>> = inner.peers.values().filter_map(Weak::upgrade).collect();

@@ -13,8 +13,8 @@ use serde::ser::{Serialize, SerializeTuple, Serializer};
 use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
 
+use super::discovered_graph::GraphEndpoint;
 use super::names;
-use super::neighbours::GraphEndpoint;
 use super::outbox::Outbox;
 use super::port::{EndpointId, EndpointKind, PortNode, Transport};
 use super::remote::GraphRole;

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::Shared;
+use crate::discovered_graph::GraphEndpoint;
 use crate::endpoints::Endpoints;
-use crate::neighbours::GraphEndpoint;
 use crate::port::{GRAPH_TOPIC, SampleReader};
 use crate::sync::lock;
 
@@ -25,7 +25,7 @@ impl Shared {
             };
         }
         let mut all = self.graph.all();
-        all.extend(self.endpoints.neighbours.all());
+        all.extend(self.endpoints.discovered_graph.all());
         all
     }
 }
@@ -34,7 +34,7 @@ async fn listen(reader: Box<dyn SampleReader>, endpoints: Arc<Endpoints>) {
     loop {
         let heard = match reader.next().await {
             Ok(_) => {
-                let heard = endpoints.neighbours.hear(&reader.bytes());
+                let heard = endpoints.discovered_graph.on_message(&reader.bytes());
                 heard.map_err(|error| error.to_string())
             }
             Err(error) => Err(error),

@@ -30,16 +30,16 @@ pub struct GraphEndpoint {
 
 /// Endpoints in other processes, by identity.
 #[derive(Default)]
-pub(crate) struct Neighbours(Mutex<Known>);
+pub(crate) struct DiscoveredGraph(Mutex<DiscoveredEndpoints>);
 
 #[derive(Default)]
-struct Known {
+struct DiscoveredEndpoints {
     endpoints: BTreeMap<EndpointId, (GraphRole, String)>,
     /// Full names of the nodes of endpoints.
     nodes: BTreeMap<EndpointId, String>,
 }
 
-impl Neighbours {
+impl DiscoveredGraph {
     /// An endpoint has been found, or tells of itself again.
     pub(crate) fn add(&self, id: EndpointId, role: GraphRole, name: &str, node: Option<String>) {
         let known = &mut *lock(&self.0);
@@ -63,7 +63,7 @@ impl Neighbours {
 
     /// Takes a message of `ros_discovery_info`, whose identities have 24 bytes up to Humble and 16 since: of one
     /// length it is none of the other. A participant speaks for its own endpoints alone.
-    pub(crate) fn hear(&self, message: &[u8]) -> Result<(), CdrError> {
+    pub(crate) fn on_message(&self, message: &[u8]) -> Result<(), CdrError> {
         match cdr::from_slice::<ParticipantEntitiesInfo<[u8; 16]>>(message) {
             Ok(message) => self.keep(message),
             Err(error) => match cdr::from_slice::<ParticipantEntitiesInfo<[u8; 24]>>(message) {
@@ -136,22 +136,22 @@ mod tests {
 
     #[test]
     fn endpoints_are_of_the_nodes_that_their_participant_names() {
-        let all = Neighbours::default();
+        let all = DiscoveredGraph::default();
         all.add(WRITER, GraphRole::Publisher, "/map", None);
         assert_eq!(all.all()[0].node, "07".repeat(16));
-        all.hear(&message(9, WRITER.0)).unwrap();
+        all.on_message(&message(9, WRITER.0)).unwrap();
         assert_eq!(all.all()[0].node, "07".repeat(16), "said by another");
-        all.hear(&message(7, WRITER.0)).unwrap();
+        all.on_message(&message(7, WRITER.0)).unwrap();
         let expected = GraphEndpoint {
             role: GraphRole::Publisher,
             name: "/map".to_owned(),
             node: "/robot/mapper".to_owned(),
         };
         assert_eq!(all.all(), std::slice::from_ref(&expected));
-        all.hear(&message(7, [8; 16])).unwrap();
+        all.on_message(&message(7, [8; 16])).unwrap();
         assert_eq!(all.all()[0].node, "07".repeat(16), "no longer its own");
         // As Humble says it.
-        all.hear(&of_identities([7_u8; 24], [7; 24])).unwrap();
+        all.on_message(&of_identities([7_u8; 24], [7; 24])).unwrap();
         assert_eq!(all.all(), [expected]);
         all.remove(|id| *id == WRITER);
         assert!(all.all().is_empty());
@@ -159,10 +159,10 @@ mod tests {
 
     #[test]
     fn what_is_sent_is_bounded_and_may_be_cut() {
-        let all = Neighbours::default();
+        let all = DiscoveredGraph::default();
         let whole = message(7, WRITER.0);
         for length in 0..whole.len() {
-            assert!(all.hear(&whole[..length]).is_err(), "{length}");
+            assert!(all.on_message(&whole[..length]).is_err(), "{length}");
         }
         let long = "x".repeat(MAX_NAME_BYTES + 1);
         all.add(WRITER, GraphRole::Publisher, &long, None);
