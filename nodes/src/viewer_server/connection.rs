@@ -18,7 +18,7 @@ use smol::{Async, Timer};
 
 use super::desk::{Desk, Step};
 use super::flow::Flow;
-use super::http::{Decision, Gate, Head, HeadError, MAX_HEAD_BYTES, Response};
+use super::http::{Decision, Head, HeadError, MAX_HEAD_BYTES, RequestAuth, Response};
 use super::hub::Hub;
 use super::inputs::{Input, InputRefusal};
 use super::offer::{MAX_MESSAGE_BYTES, MESSAGE_HEAD_BYTES};
@@ -51,7 +51,7 @@ pub struct Rooms {
 pub async fn serve(
     stream: TcpStream,
     from: IpAddr,
-    gate: Arc<Gate>,
+    auth: Arc<RequestAuth>,
     hub: Arc<Hub>,
     rooms: &Rooms,
 ) -> io::Result<()> {
@@ -63,7 +63,7 @@ pub async fn serve(
     let head = within(HEAD_TIME, read_head(&mut stream));
     let head = asking.served(head).await?;
     drop(asking);
-    let answer = match head.map(|head| gate.decide(&head)) {
+    let answer = match head.map(|head| auth.decide(&head)) {
         Ok(Decision::Upgrade(head)) => match hub.enter() {
             Some((id, woken)) => {
                 let done = talk(ClientStream::new(stream), head, id, woken, &hub).await;

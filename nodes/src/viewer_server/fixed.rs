@@ -51,9 +51,9 @@ pub fn serve_labelled(
     let chunks = keyframe(list, &stamp).into_iter().map(thin::both);
     let chunks: Vec<_> = chunks.collect::<Result<_, _>>().map_err(io::Error::other)?;
     hub.change_map(|stream| stream.set_keyframe(chunks));
-    let gate = options.gate()?;
-    let server = Server::start(options.address, gate.clone(), hub)?;
-    let url = url(server.address(), &gate);
+    let auth = options.request_auth()?;
+    let server = Server::start(options.address, auth.clone(), hub)?;
+    let url = url(server.address(), &auth);
     Ok((server, url))
 }
 

@@ -69,7 +69,7 @@ fn flood(socket: &WebSocket<TcpStream>, frames: &[u8]) -> usize {
 
 #[test]
 fn a_client_that_pings_and_reads_nothing_is_closed() {
-    let (server, hub) = server(4, Gate::default());
+    let (server, hub) = server(4, RequestAuth::default());
     let mut good = subscribed(&server, &hub);
     let hostile = subscribed(&server, &hub);
     // 1 MB at a time.
@@ -85,7 +85,7 @@ fn a_client_that_pings_and_reads_nothing_is_closed() {
 
 #[test]
 fn a_client_that_asks_and_reads_nothing_is_closed() {
-    let (server, hub) = server(4, Gate::default());
+    let (server, hub) = server(4, RequestAuth::default());
     let hostile = subscribed(&server, &hub);
     // Each is answered by its problem.
     flood(&hostile, &frame(0x81, b"{}").repeat(8000));
@@ -96,7 +96,7 @@ fn a_client_that_asks_and_reads_nothing_is_closed() {
 
 #[test]
 fn pings_of_a_client_that_reads_are_all_answered() {
-    let (server, hub) = server(4, Gate::default());
+    let (server, hub) = server(4, RequestAuth::default());
     let mut socket = subscribed(&server, &hub);
     let writer = socket.get_ref().try_clone().unwrap();
     const PINGS: u32 = 100_000;
@@ -123,7 +123,7 @@ fn pings_of_a_client_that_reads_are_all_answered() {
 
 #[test]
 fn frames_without_content_hold_nobody_up() {
-    let (server, hub) = server(4, Gate::default());
+    let (server, hub) = server(4, RequestAuth::default());
     let mut good = subscribed(&server, &hub);
     let hostile = subscribed(&server, &hub);
     let done = AtomicBool::new(false);
@@ -147,7 +147,7 @@ fn frames_without_content_hold_nobody_up() {
 
 #[test]
 fn half_a_frame_and_one_of_any_length_hold_nobody_up() {
-    let (server, hub) = server(4, Gate::default());
+    let (server, hub) = server(4, RequestAuth::default());
     let mut good = subscribed(&server, &hub);
     let mut half = subscribed(&server, &hub);
     // 60,000 bytes are said, and 3 come.
@@ -195,7 +195,7 @@ impl Write for Slow {
 
 #[test]
 fn a_slow_client_that_reads_gets_all_of_a_long_message() {
-    let (server, hub) = server(4, Gate::default());
+    let (server, hub) = server(4, RequestAuth::default());
     let stream = TcpStream::connect(server.address()).unwrap();
     // Small, so that the server sees how slow it is.
     set_socket_recv_buffer_size(&stream, 16 << 10).unwrap();
@@ -236,14 +236,14 @@ fn half_open(server: &Server, count: usize, said: &[u8]) -> Vec<TcpStream> {
 
 #[test]
 fn half_open_connections_keep_nobody_out() {
-    let gate = || Gate {
+    let auth = || RequestAuth {
         token: Some("secret".to_owned()),
-        ..Gate::default()
+        ..RequestAuth::default()
     };
     let page = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n";
     // Half a request, nothing, another protocol, a request without the token.
     for said in [&b"GET / HT"[..], b"", b"\x16\x03\x01\x02\x00", page] {
-        let (server, hub) = server(16, gate());
+        let (server, hub) = server(16, auth());
         let _crowd = half_open(&server, 200, said);
         // All that there is place for.
         let inside: Vec<_> = (0..16).map(|_| with_token(server.address())).collect();
@@ -270,11 +270,11 @@ fn half_open_connections_keep_nobody_out() {
 
 #[test]
 fn connections_that_come_again_and_again_keep_nobody_out() {
-    let gate = Gate {
+    let auth = RequestAuth {
         token: Some("secret".to_owned()),
-        ..Gate::default()
+        ..RequestAuth::default()
     };
-    let (server, hub) = server(16, gate);
+    let (server, hub) = server(16, auth);
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
         scope.spawn(|| {

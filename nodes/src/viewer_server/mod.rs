@@ -34,7 +34,7 @@ pub use counts::HubCounts;
 pub use desk::{Ask, Desk, Step};
 pub use fixed::{serve, serve_labelled};
 pub use graph::ConnectionGraph;
-pub use http::{Decision, Gate, Head};
+pub use http::{Decision, Head, RequestAuth};
 pub use hub::{Demand, Hub};
 pub use inputs::{Input, InputCounts, InputRefusal, Inputs};
 pub use map_source::{MapSource, News};

@@ -71,7 +71,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let fixed_channel = hub.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
     let inputs = Arc::new(Inputs::default());
     let waiting = Arc::new(Waiting::new(limits.events, limits.bytes));
-    let gate = viewer.gate()?;
+    let auth = viewer.request_auth()?;
     let losses = MapLosses::default();
     let mut shell = Shell {
         node: node.clone(),
@@ -102,8 +102,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let sources = Sources::new(&node, &hub, &viewer, &inbox)?;
     let _ = give.send(Parts { sources, headset });
     // Who listens comes after the channels: the list of them is sent once.
-    let server = Server::start(viewer.address, gate.clone(), Arc::clone(&hub))?;
-    tell_address(&url(server.address(), &gate), gate.token.is_some());
+    let server = Server::start(viewer.address, auth.clone(), Arc::clone(&hub))?;
+    tell_address(&url(server.address(), &auth), auth.token.is_some());
     let maps = losses.subscribe(&node, &inbox, Event::Map, Event::Update)?;
     let on_fixed = inbox.counting(
         &losses.at_inbox,

@@ -5,7 +5,7 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 use lattice_runtime::params::{ParamError, Params};
 
-use super::http::Gate;
+use super::http::RequestAuth;
 
 /// Options of the viewer server.
 #[derive(Clone, Debug)]
@@ -73,13 +73,13 @@ impl ViewerOptions {
     }
 
     /// Conditions of entry. Without a token only this machine may; where none is given, one is made.
-    pub fn gate(&self) -> std::io::Result<Gate> {
+    pub fn request_auth(&self) -> std::io::Result<RequestAuth> {
         let token = match (self.token.is_empty(), self.address.ip().is_loopback()) {
             (false, _) => Some(self.token.clone()),
             (true, true) => None,
             (true, false) => Some(random_token()?),
         };
-        Ok(Gate {
+        Ok(RequestAuth {
             hosts: self.allowed_hosts.clone(),
             origins: self.allowed_origins.clone(),
             token,
@@ -88,12 +88,12 @@ impl ViewerOptions {
 }
 
 /// The address to open in a browser.
-pub fn url(address: SocketAddr, gate: &Gate) -> String {
+pub fn url(address: SocketAddr, auth: &RequestAuth) -> String {
     let host = match address.ip().is_unspecified() {
         true => SocketAddr::new(Ipv4Addr::LOCALHOST.into(), address.port()),
         false => address,
     };
-    match &gate.token {
+    match &auth.token {
         Some(token) => format!("http://{host}/?token={token}"),
         None => format!("http://{host}"),
     }
@@ -113,17 +113,20 @@ mod tests {
     #[test]
     fn other_machines_need_a_token() {
         let mut options = ViewerOptions::default();
-        assert_eq!(options.gate().unwrap().token, None);
+        assert_eq!(options.request_auth().unwrap().token, None);
         assert_eq!(
-            url(options.address, &options.gate().unwrap()),
+            url(options.address, &options.request_auth().unwrap()),
             "http://127.0.0.1:8765"
         );
         options.address.set_ip(Ipv4Addr::UNSPECIFIED.into());
-        let [first, second] = [(), ()].map(|()| options.gate().unwrap());
+        let [first, second] = [(), ()].map(|()| options.request_auth().unwrap());
         assert_eq!(first.token.as_ref().unwrap().len(), 32);
         assert_ne!(first.token, second.token);
         assert!(url(options.address, &first).starts_with("http://127.0.0.1:8765/?token="));
         options.token = "mine".to_owned();
-        assert_eq!(options.gate().unwrap().token.as_deref(), Some("mine"));
+        assert_eq!(
+            options.request_auth().unwrap().token.as_deref(),
+            Some("mine")
+        );
     }
 }

@@ -37,7 +37,7 @@ impl Growing {
         hub.channel::<LatticeMap>("/map", Class::Map, false);
         hub.channel::<LatticeMapUpdate>("/map_updates", Class::Updates, false);
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let server = Server::start(address, Gate::default(), Arc::clone(&hub)).unwrap();
+        let server = Server::start(address, RequestAuth::default(), Arc::clone(&hub)).unwrap();
         let mut source = MapSource::new(2_000_000);
         mapper
             .keyframe()

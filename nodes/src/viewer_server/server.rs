@@ -12,7 +12,7 @@ use smol::channel::{Sender, bounded};
 use smol::{Async, LocalExecutor, Timer};
 
 use super::connection::{self, Rooms};
-use super::http::Gate;
+use super::http::RequestAuth;
 use super::hub::Hub;
 
 /// Time for clients to take the last messages.
@@ -28,7 +28,7 @@ pub struct Server {
 
 impl Server {
     /// Listens on an address; one that is taken is an error that says so.
-    pub fn start(address: SocketAddr, gate: Gate, hub: Arc<Hub>) -> io::Result<Self> {
+    pub fn start(address: SocketAddr, auth: RequestAuth, hub: Arc<Hub>) -> io::Result<Self> {
         let taken = |error: io::Error| {
             io::Error::new(
                 error.kind(),
@@ -46,7 +46,7 @@ impl Server {
             .name("viewer".to_owned())
             .spawn(move || {
                 let executor = LocalExecutor::new();
-                let accept = accept(&executor, listener, Arc::new(gate), hub);
+                let accept = accept(&executor, listener, Arc::new(auth), hub);
                 let ended = async {
                     // Ends when the sender closes.
                     let _ = stopped.recv().await;
@@ -82,7 +82,7 @@ impl Server {
 async fn accept(
     executor: &LocalExecutor<'_>,
     listener: Async<TcpListener>,
-    gate: Arc<Gate>,
+    auth: Arc<RequestAuth>,
     hub: Arc<Hub>,
 ) {
     let rooms = Rc::new(Rooms::default());
@@ -99,10 +99,10 @@ async fn accept(
                 continue;
             }
         };
-        let (gate, hub, rooms) = (Arc::clone(&gate), Arc::clone(&hub), Rc::clone(&rooms));
+        let (auth, hub, rooms) = (Arc::clone(&auth), Arc::clone(&hub), Rc::clone(&rooms));
         executor
             .spawn(async move {
-                if let Err(error) = connection::serve(stream, from, gate, hub, &rooms).await {
+                if let Err(error) = connection::serve(stream, from, auth, hub, &rooms).await {
                     log::debug!("a connection ended: {error}");
                 }
             })

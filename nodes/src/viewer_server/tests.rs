@@ -87,13 +87,13 @@ proptest! {
     }
 }
 
-pub(super) fn server(max_clients: usize, gate: Gate) -> (Server, Arc<Hub>) {
+pub(super) fn server(max_clients: usize, auth: RequestAuth) -> (Server, Arc<Hub>) {
     let hub = Arc::new(Hub::new(max_clients));
     hub.channel::<LatticeMap>("/map", Class::Map, false);
     hub.channel::<TFMessage>("/tf", Class::Newest { depth: 2 }, false);
     hub.channel::<TFMessage>("/tf_static", Class::Newest { depth: 1 }, true);
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    (Server::start(address, gate, Arc::clone(&hub)).unwrap(), hub)
+    (Server::start(address, auth, Arc::clone(&hub)).unwrap(), hub)
 }
 
 /// The code of the answer to some bytes.
@@ -143,7 +143,7 @@ pub(super) fn data(socket: &mut WebSocket<TcpStream>) -> (u32, Vec<u8>) {
 
 #[test]
 fn a_client_gets_what_it_subscribes_to_and_late_ones_what_is_kept() {
-    let (server, hub) = server(4, Gate::default());
+    let (server, hub) = server(4, RequestAuth::default());
     hub.offer(2, cdr::to_vec(&TFMessage::default()).unwrap());
     let map = LatticeMap {
         voxels_total: 7,
@@ -180,16 +180,16 @@ fn a_client_gets_what_it_subscribes_to_and_late_ones_what_is_kept() {
 
 #[test]
 fn strangers_and_one_client_too_many_are_refused() {
-    let gate = Gate {
+    let auth = RequestAuth {
         token: Some("secret".to_owned()),
-        ..Gate::default()
+        ..RequestAuth::default()
     };
-    let (guarded, _) = server(1, gate);
+    let (protected, _) = server(1, auth);
     assert_eq!(
-        answer(&guarded, b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+        answer(&protected, b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"),
         "401"
     );
-    let (server, hub) = server(16, Gate::default());
+    let (server, hub) = server(16, RequestAuth::default());
     for (request, code) in [
         ("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n", "200"),
         ("GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", "421"),
@@ -220,13 +220,13 @@ fn strangers_and_one_client_too_many_are_refused() {
     ) {}
     assert_eq!(text(&mut inside[1].0)["op"], "serverInfo");
     server.finish();
-    guarded.finish();
+    protected.finish();
 }
 
 #[test]
 fn a_taken_port_is_one_clear_line() {
-    let (server, hub) = server(1, Gate::default());
-    let Err(error) = Server::start(server.address(), Gate::default(), hub) else {
+    let (server, hub) = server(1, RequestAuth::default());
+    let Err(error) = Server::start(server.address(), RequestAuth::default(), hub) else {
         panic!("two servers on one port");
     };
     let error = error.to_string();

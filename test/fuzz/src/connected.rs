@@ -1,20 +1,22 @@
 //! Bodies of the targets of what clients of the viewer send: heads of requests, messages of the protocol.
 
-use lattice_nodes::viewer_server::{AdvertisedService, Desk, Gate, Head, Offer, OpenTopic, Step};
+use lattice_nodes::viewer_server::{
+    AdvertisedService, Desk, Head, Offer, OpenTopic, RequestAuth, Step,
+};
 
 /// Reads the head of a request, and decides on it.
 pub fn http_head(bytes: &[u8]) {
     if let Ok(Some((head, length))) = Head::parse(bytes) {
         assert!(length <= bytes.len());
         let token = Some("secret".to_owned());
-        for gate in [
-            Gate::default(),
-            Gate {
+        for auth in [
+            RequestAuth::default(),
+            RequestAuth {
                 token,
-                ..Gate::default()
+                ..RequestAuth::default()
             },
         ] {
-            gate.decide(&head);
+            auth.decide(&head);
         }
         // The same once more, whatever follows it.
         let again = Head::parse(&[&bytes[..length], b"more"].concat());

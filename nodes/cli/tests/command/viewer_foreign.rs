@@ -14,7 +14,7 @@ use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 use lattice_msgs::std_msgs::{self, Header};
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
-use lattice_nodes::viewer_server::{Class, Entry, Gate, Hub, Server};
+use lattice_nodes::viewer_server::{Class, Entry, Hub, RequestAuth, Server};
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
@@ -114,7 +114,7 @@ fn server() -> (Server, Value) {
     kept!("/map_centers", cloud());
     kept!("/tf", transforms());
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    let server = Server::start(address, Gate::default(), Arc::clone(&hub)).unwrap();
+    let server = Server::start(address, RequestAuth::default(), Arc::clone(&hub)).unwrap();
     (server, Value::Object(all))
 }
 

@@ -13,7 +13,7 @@ use lattice_msgs::lattice::{LatticeInfo, LatticeMap};
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
-use lattice_nodes::viewer_server::{Class, Entry, Gate, Hub, Server};
+use lattice_nodes::viewer_server::{Class, Entry, Hub, RequestAuth, Server};
 use serde::Serialize;
 use serde_bytes::ByteBuf;
 
@@ -84,7 +84,7 @@ impl Stage {
         let chunk = chunk(&map(cells));
         hub.change_map(|stream| stream.set_keyframe(vec![chunk]));
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let server = Server::start(address, Gate::default(), Arc::clone(&hub)).unwrap();
+        let server = Server::start(address, RequestAuth::default(), Arc::clone(&hub)).unwrap();
         Self {
             hub,
             calibration,

@@ -18,7 +18,7 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; worker-src 'self'; 
 
 /// Conditions on which a request is let in.
 #[derive(Clone, Debug, Default)]
-pub struct Gate {
+pub struct RequestAuth {
     /// Names by which this machine may be called, besides `localhost` and addresses.
     pub hosts: Vec<String>,
     /// Origins of pages from elsewhere that may connect, such as `https://viewer.example`.
@@ -49,7 +49,7 @@ pub enum Decision {
     Upgrade(String),
 }
 
-impl Gate {
+impl RequestAuth {
     /// Decides about a request.
     pub fn decide(&self, head: &Head) -> Decision {
         let Some(host) = head.host.as_deref().filter(|host| self.knows(host)) else {
@@ -210,8 +210,8 @@ mod tests {
         Head::parse(text.as_bytes()).unwrap().unwrap().0
     }
 
-    fn status(gate: &Gate, lines: &str) -> String {
-        match gate.decide(&request(lines)) {
+    fn status(auth: &RequestAuth, lines: &str) -> String {
+        match auth.decide(&request(lines)) {
             Decision::Answer(answer) => answer.status.split(' ').next().unwrap().to_owned(),
             Decision::Upgrade(bytes) => bytes.split(' ').nth(1).unwrap().to_owned(),
         }
@@ -222,9 +222,9 @@ mod tests {
 
     #[test]
     fn files_are_served_to_names_of_this_machine() {
-        let gate = Gate {
+        let auth = RequestAuth {
             hosts: vec!["robot.local".to_owned()],
-            ..Gate::default()
+            ..RequestAuth::default()
         };
         for host in [
             "127.0.0.1:8765",
@@ -234,51 +234,51 @@ mod tests {
             "Robot.local:80",
         ] {
             assert_eq!(
-                status(&gate, &format!("GET / HTTP/1.1\nHost: {host}")),
+                status(&auth, &format!("GET / HTTP/1.1\nHost: {host}")),
                 "200",
                 "{host}"
             );
         }
         for host in ["evil.example:8765", "localhost.evil.example", ""] {
             assert_eq!(
-                status(&gate, &format!("GET / HTTP/1.1\nHost: {host}")),
+                status(&auth, &format!("GET / HTTP/1.1\nHost: {host}")),
                 "421",
                 "{host}"
             );
         }
-        assert_eq!(status(&gate, "GET / HTTP/1.1"), "421");
+        assert_eq!(status(&auth, "GET / HTTP/1.1"), "421");
         assert_eq!(
-            status(&gate, "GET /etc/passwd HTTP/1.1\nHost: localhost"),
+            status(&auth, "GET /etc/passwd HTTP/1.1\nHost: localhost"),
             "404"
         );
-        assert_eq!(status(&gate, "POST / HTTP/1.1\nHost: localhost"), "405");
+        assert_eq!(status(&auth, "POST / HTTP/1.1\nHost: localhost"), "405");
     }
 
     #[test]
     fn a_socket_needs_its_own_origin_or_one_that_is_allowed() {
-        let mut gate = Gate::default();
-        let ask = |gate: &Gate, origin: &str| {
+        let mut auth = RequestAuth::default();
+        let ask = |auth: &RequestAuth, origin: &str| {
             let host = "Host: 127.0.0.1:8765";
-            status(gate, &format!("GET / HTTP/1.1\n{host}\n{origin}{SOCKET}"))
+            status(auth, &format!("GET / HTTP/1.1\n{host}\n{origin}{SOCKET}"))
         };
-        assert_eq!(ask(&gate, ""), "101", "no browser");
-        assert_eq!(ask(&gate, "Origin: http://127.0.0.1:8765\n"), "101");
+        assert_eq!(ask(&auth, ""), "101", "no browser");
+        assert_eq!(ask(&auth, "Origin: http://127.0.0.1:8765\n"), "101");
         for other in [
             "http://127.0.0.1:80",
             "https://viewer.example",
             "null",
             "http://localhost:8765",
         ] {
-            assert_eq!(ask(&gate, &format!("Origin: {other}\n")), "403", "{other}");
+            assert_eq!(ask(&auth, &format!("Origin: {other}\n")), "403", "{other}");
         }
-        gate.origins.push("https://viewer.example".to_owned());
-        assert_eq!(ask(&gate, "Origin: https://viewer.example\n"), "101");
+        auth.origins.push("https://viewer.example".to_owned());
+        assert_eq!(ask(&auth, "Origin: https://viewer.example\n"), "101");
     }
 
     #[test]
     fn the_accepted_key_is_that_of_the_standard() {
         let head = request(&format!("GET / HTTP/1.1\nHost: localhost\n{SOCKET}"));
-        let Decision::Upgrade(bytes) = Gate::default().decide(&head) else {
+        let Decision::Upgrade(bytes) = RequestAuth::default().decide(&head) else {
             panic!("no upgrade");
         };
         // The example of RFC 6455, section 1.3.
@@ -288,11 +288,11 @@ mod tests {
 
     #[test]
     fn a_token_comes_by_address_once_and_then_by_cookie() {
-        let gate = Gate {
+        let auth = RequestAuth {
             token: Some("secret".to_owned()),
-            ..Gate::default()
+            ..RequestAuth::default()
         };
-        let ask = |lines: &str| status(&gate, &format!("{lines}\nHost: 10.0.0.7"));
+        let ask = |lines: &str| status(&auth, &format!("{lines}\nHost: 10.0.0.7"));
         assert_eq!(ask("GET / HTTP/1.1"), "401");
         assert_eq!(ask("GET /?token=secre HTTP/1.1"), "401");
         assert_eq!(ask("GET /?token=secret HTTP/1.1"), "303");
