@@ -1,4 +1,4 @@
-//! Client of a hub: its outbox, what it watches and the pace of its refusals.
+//! One client of the broadcaster: its outbox, what it watches and the pace of its refusals.
 
 use std::time::Duration;
 

@@ -16,10 +16,10 @@ use smol::channel::Receiver;
 use smol::future::{or, pending, poll_once, yield_now};
 use smol::{Async, Timer};
 
-use super::desk::{Desk, Step};
+use super::broadcaster::Broadcaster;
+use super::client_session::{ClientSession, Step};
 use super::flow::Flow;
 use super::http::{Decision, Head, HeadError, MAX_HEAD_BYTES, RequestAuth, Response};
-use super::hub::Hub;
 use super::inputs::{Input, InputRefusal};
 use super::offer::{MAX_MESSAGE_BYTES, MESSAGE_HEAD_BYTES};
 use super::outbox::Outgoing;
@@ -38,7 +38,7 @@ const SEND_BUFFER_BYTES: usize = 512 << 10;
 
 type Stream = Async<TcpStream>;
 
-/// Room for connections that are no client; clients have [`Hub`]'s.
+/// Room for connections that are no client; clients have [`Broadcaster`]'s.
 #[derive(Default)]
 pub struct Rooms {
     /// Those whose request has not come.
@@ -52,25 +52,25 @@ pub async fn serve(
     stream: TcpStream,
     from: IpAddr,
     auth: Arc<RequestAuth>,
-    hub: Arc<Hub>,
+    broadcaster: Arc<Broadcaster>,
     rooms: &Rooms,
 ) -> io::Result<()> {
     rustix::net::sockopt::set_socket_send_buffer_size(&stream, SEND_BUFFER_BYTES)?;
     stream.set_nodelay(true)?;
     let mut stream = Async::new(stream)?;
     let asking = rooms.asking.enter(from);
-    hub.count_displaced(rooms.asking.take_displaced());
+    broadcaster.count_displaced(rooms.asking.take_displaced());
     let head = within(HEAD_TIME, read_head(&mut stream));
     let head = asking.served(head).await?;
     drop(asking);
     let answer = match head.map(|head| auth.decide(&head)) {
-        Ok(Decision::Upgrade(head)) => match hub.enter() {
+        Ok(Decision::Upgrade(head)) => match broadcaster.enter() {
             Some((id, woken)) => {
-                let done = talk(ClientStream::new(stream), head, id, woken, &hub).await;
+                let done = talk(ClientStream::new(stream), head, id, woken, &broadcaster).await;
                 if matches!(&done, Err(error) if error.kind() == io::ErrorKind::TimedOut) {
-                    hub.count_stalled();
+                    broadcaster.count_stalled();
                 }
-                hub.leave(id);
+                broadcaster.leave(id);
                 return done;
             }
             None => Response::full(),
@@ -82,7 +82,7 @@ pub async fn serve(
         }
     };
     let answered = rooms.answered.enter(from);
-    hub.count_displaced(rooms.answered.take_displaced());
+    broadcaster.count_displaced(rooms.answered.take_displaced());
     let answer = async {
         stream.write_all(&answer.bytes()).await?;
         stream.close().await
@@ -117,24 +117,24 @@ async fn talk(
     head: String,
     id: u64,
     woken: Receiver<()>,
-    hub: &Hub,
+    broadcaster: &Broadcaster,
 ) -> io::Result<()> {
     let progress = stream.progress();
     progress.sent(stream.write_all(head.as_bytes())).await?;
-    let offer = hub.offer_of_bridge();
+    let offer = broadcaster.offer_of_bridge();
     let longest = Some(offer.max_message_bytes());
     let config = WebSocketConfig::default()
         .max_message_size(longest)
         .max_frame_size(longest);
     let mut socket = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
-    let mut desk = Desk::new(offer);
+    let mut session = ClientSession::new(offer);
     let mut flow = Flow::new(offer.stream_bytes_per_s, Instant::now());
     let mut asked = FuturesUnordered::new();
     loop {
         // What has come goes first: who unsubscribes gets no more.
         let event = match poll_once(socket.next()).await {
             Some(come) => Event::Come(come),
-            None => match hub.next(id) {
+            None => match broadcaster.next(id) {
                 Some(next) => {
                     send(&mut socket, &progress, next).await?;
                     continue;
@@ -162,23 +162,23 @@ async fn talk(
         let step = match event {
             Event::Woken => Step::Done,
             Event::Answered(messages) => {
-                desk.answered();
+                session.answered();
                 messages
                     .into_iter()
-                    .for_each(|message| hub.tell(id, message));
+                    .for_each(|message| broadcaster.tell(id, message));
                 Step::Done
             }
             // Before anything is made of it.
             Event::Come(Some(Ok(message))) if !is_paced(&mut flow, message.len()) => {
                 let refusal = InputRefusal::TooMuch;
-                if let Some(bridge) = hub.bridge() {
+                if let Some(bridge) = broadcaster.bridge() {
                     bridge.inputs().refused(refusal);
                 }
-                hub.refuse(id, refusal);
+                broadcaster.refuse(id, refusal);
                 Step::Done
             }
-            Event::Come(Some(Ok(Message::Text(text)))) => desk.text(&text),
-            Event::Come(Some(Ok(Message::Binary(bytes)))) => desk.data(&bytes),
+            Event::Come(Some(Ok(Message::Text(text)))) => session.text(&text),
+            Event::Come(Some(Ok(Message::Binary(bytes)))) => session.data(&bytes),
             Event::Come(Some(Ok(Message::Close(_))) | None) => return Ok(()),
             // Before more is read, or a client that pings without end would fill the memory with answers.
             Event::Come(Some(Ok(Message::Ping(_)))) => {
@@ -189,7 +189,7 @@ async fn talk(
             Event::Come(Some(Ok(_))) => Step::Done,
             Event::Come(Some(Err(error))) => {
                 if matches!(error, tungstenite::Error::Capacity(_)) {
-                    too_long(&mut socket, hub).await;
+                    too_long(&mut socket, broadcaster).await;
                 }
                 return Err(io::Error::other(error));
             }
@@ -197,22 +197,22 @@ async fn talk(
         match step {
             Step::Subscribe(wishes) => {
                 for wish in wishes {
-                    hub.subscribe(id, wish.id, wish.channel_id);
+                    broadcaster.subscribe(id, wish.id, wish.channel_id);
                 }
             }
-            Step::Watch(names, watch) => hub.watch(id, names, watch),
-            Step::Graph(follow) => hub.follow_graph(id, follow),
-            Step::Unsubscribe(subscriptions) => hub.unsubscribe(id, &subscriptions),
-            Step::Ask(ask) => match hub.bridge() {
+            Step::Watch(names, watch) => broadcaster.watch(id, names, watch),
+            Step::Graph(follow) => broadcaster.follow_graph(id, follow),
+            Step::Unsubscribe(subscriptions) => broadcaster.unsubscribe(id, &subscriptions),
+            Step::Ask(ask) => match broadcaster.bridge() {
                 Some(bridge) => asked.push(bridge.ask(ask)),
-                None => desk.answered(),
+                None => session.answered(),
             },
             Step::Input(input) => {
-                if let Some(refusal) = take(hub, id, &mut flow, input) {
-                    hub.refuse(id, refusal);
+                if let Some(refusal) = take(broadcaster, id, &mut flow, input) {
+                    broadcaster.refuse(id, refusal);
                 }
             }
-            Step::Tell(text) => hub.tell(id, Outgoing::Text(text)),
+            Step::Tell(text) => broadcaster.tell(id, Outgoing::Text(text)),
             Step::Done => {}
         }
     }
@@ -231,8 +231,8 @@ fn is_paced(flow: &mut Flow, bytes: usize) -> bool {
 }
 
 /// Hands a message for a headset over, at the pace of its client; what is refused is counted.
-fn take(hub: &Hub, id: u64, flow: &mut Flow, input: Input) -> Option<InputRefusal> {
-    let bridge = hub.bridge()?;
+fn take(broadcaster: &Broadcaster, id: u64, flow: &mut Flow, input: Input) -> Option<InputRefusal> {
+    let bridge = broadcaster.bridge()?;
     // A long one was asked for its pace when it came.
     let head_and_message = input.bytes.len() + MESSAGE_HEAD_BYTES;
     let is_long = head_and_message > MAX_MESSAGE_BYTES;
@@ -246,9 +246,9 @@ fn take(hub: &Hub, id: u64, flow: &mut Flow, input: Input) -> Option<InputRefusa
 }
 
 /// Tells why the connection ends: what comes next of it cannot be told from the rest of the message.
-async fn too_long(socket: &mut WebSocketStream<ClientStream>, hub: &Hub) {
-    let has_headset = hub.offer_of_bridge().stream_bytes_per_s > 0;
-    if let Some(bridge) = hub.bridge().filter(|_| has_headset) {
+async fn too_long(socket: &mut WebSocketStream<ClientStream>, broadcaster: &Broadcaster) {
+    let has_headset = broadcaster.offer_of_bridge().stream_bytes_per_s > 0;
+    if let Some(bridge) = broadcaster.bridge().filter(|_| has_headset) {
         bridge.inputs().refused(InputRefusal::TooLong);
     }
     let close = CloseFrame {

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// Counters of the server.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct HubCounts {
+pub struct BroadcasterCounts {
     /// Clients that were let in.
     pub clients_in: u64,
     /// Clients refused since all places were taken.

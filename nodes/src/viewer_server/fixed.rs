@@ -9,7 +9,7 @@ use lattice_msgs::cdr;
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 
-use super::hub::{Hub, entry};
+use super::broadcaster::{Broadcaster, entry};
 use super::options::{ViewerOptions, url};
 use super::outbox::Class;
 use super::server::Server;
@@ -30,12 +30,13 @@ pub fn serve_labelled(
     names: &LabelNames,
     options: &ViewerOptions,
 ) -> io::Result<(Server, String)> {
-    let hub = Arc::new(Hub::of_file(options.max_clients));
-    hub.map_channels("/map", "/map_updates");
+    let broadcaster = Arc::new(Broadcaster::of_file(options.max_clients));
+    broadcaster.map_channels("/map", "/map_updates");
     if !names.is_empty() {
-        let channel = hub.channel::<LabelInfo>("/label_info", Class::Newest { depth: 1 }, true);
+        let channel =
+            broadcaster.channel::<LabelInfo>("/label_info", Class::Newest { depth: 1 }, true);
         let info = cdr::to_vec(&label_info(names)).map_err(io::Error::other)?;
-        hub.offer(channel, info);
+        broadcaster.offer(channel, info);
     }
     let stamp = MapStamp {
         header: Header {
@@ -50,9 +51,9 @@ pub fn serve_labelled(
     };
     let chunks = keyframe(list, &stamp).into_iter().map(thin::both);
     let chunks: Vec<_> = chunks.collect::<Result<_, _>>().map_err(io::Error::other)?;
-    hub.change_map(|stream| stream.set_keyframe(chunks));
+    broadcaster.change_map(|stream| stream.set_keyframe(chunks));
     let auth = options.request_auth()?;
-    let server = Server::start(options.address, auth.clone(), hub)?;
+    let server = Server::start(options.address, auth.clone(), broadcaster)?;
     let url = url(server.address(), &auth);
     Ok((server, url))
 }

@@ -1,18 +1,18 @@
 //! The viewer server: a page that draws the map, and a Foxglove WebSocket, on one port.
 //!
-//! The node's thread follows the map and offers messages to a [`Hub`]; the server's thread gives each
+//! The node's thread follows the map and offers messages to a [`Broadcaster`]; the server's thread gives each
 //! client what it wants, at the client's pace.
 
 mod bridge;
+mod broadcaster;
 mod client;
+mod client_session;
 mod connection;
 mod counts;
-mod desk;
 mod fixed;
 mod flow;
 mod graph;
 mod http;
-mod hub;
 mod inputs;
 mod map_source;
 mod map_stream;
@@ -30,12 +30,12 @@ mod thin;
 mod watched;
 
 pub use bridge::Bridge;
-pub use counts::HubCounts;
-pub use desk::{Ask, Desk, Step};
+pub use broadcaster::{Broadcaster, Demand};
+pub use client_session::{Ask, ClientSession, Step};
+pub use counts::BroadcasterCounts;
 pub use fixed::{serve, serve_labelled};
 pub use graph::ConnectionGraph;
 pub use http::{Decision, Head, RequestAuth};
-pub use hub::{Demand, Hub};
 pub use inputs::{Input, InputCounts, InputRefusal, Inputs};
 pub use map_source::{MapSource, News};
 pub use map_stream::{Cursor, Entry, MapStream, Next};

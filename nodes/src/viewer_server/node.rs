@@ -10,8 +10,8 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use serde::Serialize;
 
 use super::bridge::{HandOver, HeadsetTopics, NodeBridge};
-use super::counts::HubCounts;
-use super::hub::Hub;
+use super::broadcaster::Broadcaster;
+use super::counts::BroadcasterCounts;
 use super::inputs::{Input, InputCounts, Inputs, Waiting};
 use super::map_source::{MapSource, News};
 use super::map_stream::MapStream;
@@ -49,7 +49,7 @@ impl FromChannel for Event {
 /// Report of a server at its end.
 #[derive(Serialize)]
 struct ViewerReport {
-    counts: HubCounts,
+    counts: BroadcasterCounts,
     inputs: InputCounts,
     voxels: usize,
     messages_lost: u64,
@@ -65,17 +65,17 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         reach,
         report_file,
     } = Settings::from_params(params)?;
-    let hub = Arc::new(Hub::new(viewer.max_clients));
-    hub.map_channels(&node.resolve("map")?, &node.resolve("map_updates")?);
+    let broadcaster = Arc::new(Broadcaster::new(viewer.max_clients));
+    broadcaster.map_channels(&node.resolve("map")?, &node.resolve("map_updates")?);
     let one = Class::Newest { depth: 1 };
-    let fixed_channel = hub.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
+    let fixed_channel = broadcaster.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
     let inputs = Arc::new(Inputs::default());
     let waiting = Arc::new(Waiting::new(limits.events, limits.bytes));
     let auth = viewer.request_auth()?;
     let losses = MapLosses::default();
     let mut shell = Shell {
         node: node.clone(),
-        hub: Arc::clone(&hub),
+        broadcaster: Arc::clone(&broadcaster),
         source: MapSource::new(viewer.max_voxels),
         parts: None,
         inputs: Arc::clone(&inputs),
@@ -97,12 +97,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     })?;
     let inbox = compute.inbox();
     let hand_over = hand_over(&inbox, waiting);
-    let (bridge, headset) = NodeBridge::new(&node, &reach, &hub, (inputs, hand_over))?;
-    hub.set_bridge(Box::new(bridge));
-    let sources = Sources::new(&node, &hub, &viewer, &inbox)?;
+    let (bridge, headset) = NodeBridge::new(&node, &reach, &broadcaster, (inputs, hand_over))?;
+    broadcaster.set_bridge(Box::new(bridge));
+    let sources = Sources::new(&node, &broadcaster, &viewer, &inbox)?;
     let _ = give.send(Parts { sources, headset });
     // Who listens comes after the channels: the list of them is sent once.
-    let server = Server::start(viewer.address, auth.clone(), Arc::clone(&hub))?;
+    let server = Server::start(viewer.address, auth.clone(), Arc::clone(&broadcaster))?;
     tell_address(&url(server.address(), &auth), auth.token.is_some());
     let maps = losses.subscribe(&node, &inbox, Event::Map, Event::Update)?;
     let on_fixed = inbox.counting(
@@ -170,7 +170,7 @@ fn tell_address(url: &str, has_token: bool) {
 /// State of the compute thread.
 struct Shell {
     node: Node,
-    hub: Arc<Hub>,
+    broadcaster: Arc<Broadcaster>,
     source: MapSource,
     parts: Option<Parts>,
     inputs: Arc<Inputs>,
@@ -196,11 +196,11 @@ impl Shell {
             }
             Event::FixedTransforms(message) => {
                 if let Ok(all) = self.fixed.add(&message) {
-                    self.hub.offer(self.fixed_channel, all);
+                    self.broadcaster.offer(self.fixed_channel, all);
                 }
             }
             Event::Message(channel, message) => match message() {
-                Ok(cdr) => self.hub.offer(channel, cdr),
+                Ok(cdr) => self.broadcaster.offer(channel, cdr),
                 Err(error) => log::debug!("not passed on: {error}"),
             },
             Event::Input(client, input) => self.pass(client, &input),
@@ -217,7 +217,7 @@ impl Shell {
             Ok(()) => self.inputs.taken(input.bytes.len()),
             Err(refusal) => {
                 self.inputs.refused(refusal);
-                self.hub.refuse(client, refusal);
+                self.broadcaster.refuse(client, refusal);
             }
         }
     }
@@ -229,12 +229,13 @@ impl Shell {
             self.input.ask_for_keyframe();
         }
         if let Some(parts) = &mut self.parts {
-            parts.sources.adapt(&self.hub);
+            parts.sources.adapt(&self.broadcaster);
         }
         self.feed();
         if second {
-            if self.hub.graph_wanted() {
-                self.hub.set_graph(self.node.graph().into_iter().collect());
+            if self.broadcaster.graph_wanted() {
+                self.broadcaster
+                    .set_graph(self.node.graph().into_iter().collect());
             }
             self.diagnose();
         }
@@ -244,18 +245,20 @@ impl Shell {
     fn feed(&mut self) {
         match self.source.take_news() {
             Ok(News::Nothing) => {}
-            Ok(News::OtherMap) => self.hub.change_map(MapStream::reset),
+            Ok(News::OtherMap) => self.broadcaster.change_map(MapStream::reset),
             Ok(News::Updates(updates)) => self
-                .hub
+                .broadcaster
                 .change_map(|stream| updates.into_iter().for_each(|update| stream.push(update))),
             Err(error) => log::warn!("the map was not passed on: {error}"),
         }
-        if !self.hub.keyframe_wanted() {
+        if !self.broadcaster.keyframe_wanted() {
             return;
         }
         // Not within the lock: it takes a while, and only this thread changes the map.
         match self.source.keyframe() {
-            Ok(Some(chunks)) => self.hub.change_map(|stream| stream.set_keyframe(chunks)),
+            Ok(Some(chunks)) => self
+                .broadcaster
+                .change_map(|stream| stream.set_keyframe(chunks)),
             Ok(None) => {}
             Err(error) => log::warn!("the map was not passed on: {error}"),
         }
@@ -272,9 +275,9 @@ impl Shell {
     }
 
     fn diagnose(&self) {
-        let clients = self.hub.clients();
+        let clients = self.broadcaster.clients();
         let inputs = self.inputs.counts();
-        let mut values = report::key_values(&self.hub.counts());
+        let mut values = report::key_values(&self.broadcaster.counts());
         values.extend(report::key_values(&inputs));
         values.push(("clients".into(), clients.to_string()));
         values.push(("voxels".into(), self.voxels().to_string()));
@@ -301,7 +304,7 @@ impl Shell {
             parts.sources.end();
         }
         let report = ViewerReport {
-            counts: self.hub.counts(),
+            counts: self.broadcaster.counts(),
             inputs: self.inputs.counts(),
             voxels: self.voxels(),
             messages_lost: self.messages_lost(),

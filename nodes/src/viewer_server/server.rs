@@ -11,16 +11,16 @@ use lattice_runtime::logging::Throttle;
 use smol::channel::{Sender, bounded};
 use smol::{Async, LocalExecutor, Timer};
 
+use super::broadcaster::Broadcaster;
 use super::connection::{self, Rooms};
 use super::http::RequestAuth;
-use super::hub::Hub;
 
 /// Time for clients to take the last messages.
 const LAST_TIME: Duration = Duration::from_secs(1);
 
 /// A server that is at work.
 pub struct Server {
-    hub: Arc<Hub>,
+    broadcaster: Arc<Broadcaster>,
     address: SocketAddr,
     stop: Sender<()>,
     thread: JoinHandle<()>,
@@ -28,7 +28,11 @@ pub struct Server {
 
 impl Server {
     /// Listens on an address; one that is taken is an error that says so.
-    pub fn start(address: SocketAddr, auth: RequestAuth, hub: Arc<Hub>) -> io::Result<Self> {
+    pub fn start(
+        address: SocketAddr,
+        auth: RequestAuth,
+        broadcaster: Arc<Broadcaster>,
+    ) -> io::Result<Self> {
         let taken = |error: io::Error| {
             io::Error::new(
                 error.kind(),
@@ -41,12 +45,12 @@ impl Server {
         let address = listener.local_addr()?;
         let listener = Async::new(listener)?;
         let (stop, stopped) = bounded::<()>(1);
-        let served = Arc::clone(&hub);
+        let served = Arc::clone(&broadcaster);
         let thread = std::thread::Builder::new()
             .name("viewer".to_owned())
             .spawn(move || {
                 let executor = LocalExecutor::new();
-                let accept = accept(&executor, listener, Arc::new(auth), hub);
+                let accept = accept(&executor, listener, Arc::new(auth), broadcaster);
                 let ended = async {
                     // Ends when the sender closes.
                     let _ = stopped.recv().await;
@@ -54,7 +58,7 @@ impl Server {
                 smol::block_on(executor.run(smol::future::or(accept, ended)));
             })?;
         Ok(Self {
-            hub: served,
+            broadcaster: served,
             address,
             stop,
             thread,
@@ -69,7 +73,7 @@ impl Server {
     /// Lets clients take what there is, for a second at most, and closes all connections.
     pub fn finish(self) {
         let late = Instant::now() + LAST_TIME;
-        while !self.hub.is_drained() && Instant::now() < late {
+        while !self.broadcaster.is_drained() && Instant::now() < late {
             std::thread::sleep(Duration::from_millis(10));
         }
         self.stop.close();
@@ -83,7 +87,7 @@ async fn accept(
     executor: &LocalExecutor<'_>,
     listener: Async<TcpListener>,
     auth: Arc<RequestAuth>,
-    hub: Arc<Hub>,
+    broadcaster: Arc<Broadcaster>,
 ) {
     let rooms = Rc::new(Rooms::default());
     let warnings = Throttle::new(Duration::from_secs(5));
@@ -99,10 +103,15 @@ async fn accept(
                 continue;
             }
         };
-        let (auth, hub, rooms) = (Arc::clone(&auth), Arc::clone(&hub), Rc::clone(&rooms));
+        let (auth, broadcaster, rooms) = (
+            Arc::clone(&auth),
+            Arc::clone(&broadcaster),
+            Rc::clone(&rooms),
+        );
         executor
             .spawn(async move {
-                if let Err(error) = connection::serve(stream, from, auth, hub, &rooms).await {
+                if let Err(error) = connection::serve(stream, from, auth, broadcaster, &rooms).await
+                {
                     log::debug!("a connection ended: {error}");
                 }
             })

@@ -17,7 +17,7 @@ use lattice_msgs::{RosMessage, cdr};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Node, RuntimeError, Subscription, SubscriptionExecutor};
 
-use super::hub::{Demand, Hub};
+use super::broadcaster::{Broadcaster, Demand};
 use super::options::ViewerOptions;
 use super::outbox::Class;
 use crate::compute::Inbox;
@@ -65,10 +65,10 @@ pub struct Sources {
     pub lost: Arc<AtomicU64>,
 }
 
-/// Adds sources to a hub.
+/// Adds sources to a broadcaster.
 struct Builder<'a, E> {
     node: &'a Node,
-    hub: &'a Hub,
+    broadcaster: &'a Broadcaster,
     inbox: &'a Inbox<E>,
     sources: Sources,
 }
@@ -83,7 +83,9 @@ impl<E: FromChannel> Builder<'_, E> {
     ) -> Result<(), RuntimeError> {
         let kept = when != When::EachAnew && qos.durability == Qos::LATCHED.durability;
         let full = self.node.resolve(topic)?;
-        let channel = self.hub.channel::<M>(&full, Class::Newest { depth }, kept);
+        let channel = self
+            .broadcaster
+            .channel::<M>(&full, Class::Newest { depth }, kept);
         let (node, inbox) = (self.node.clone(), self.inbox.clone());
         let (topic, lost) = (topic.to_owned(), Arc::clone(&self.sources.lost));
         self.sources.sources.push(Source {
@@ -106,10 +108,10 @@ impl<E: FromChannel> Builder<'_, E> {
 }
 
 impl Sources {
-    /// Adds the channels of all topics to a hub.
+    /// Adds the channels of all topics to a broadcaster.
     pub fn new<E: FromChannel>(
         node: &Node,
-        hub: &Hub,
+        broadcaster: &Broadcaster,
         options: &ViewerOptions,
         inbox: &Inbox<E>,
     ) -> Result<Self, RuntimeError> {
@@ -119,7 +121,7 @@ impl Sources {
         };
         let mut builder = Builder {
             node,
-            hub,
+            broadcaster,
             inbox,
             sources,
         };
@@ -149,9 +151,9 @@ impl Sources {
     }
 
     /// Makes and ends subscriptions as clients want them.
-    pub fn adapt(&mut self, hub: &Hub) {
+    pub fn adapt(&mut self, broadcaster: &Broadcaster) {
         for source in &mut self.sources {
-            let Demand { clients, joined } = hub.demand(source.channel);
+            let Demand { clients, joined } = broadcaster.demand(source.channel);
             let wanted = clients > 0 || source.when == When::Always;
             let anew = source.when == When::EachAnew && joined != source.joined;
             if !wanted || anew {

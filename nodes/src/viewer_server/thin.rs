@@ -5,7 +5,7 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 
-use super::hub::entry;
+use super::broadcaster::entry;
 use super::map_stream::Entry;
 
 /// Name of the encoding: `keys` holds the keys as ever, then the counts in the same order as LEB128.

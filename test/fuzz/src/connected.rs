@@ -1,7 +1,7 @@
 //! Bodies of the targets of what clients of the viewer send: heads of requests, messages of the protocol.
 
 use lattice_nodes::viewer_server::{
-    AdvertisedService, Desk, Head, Offer, OpenTopic, RequestAuth, Step,
+    AdvertisedService, ClientSession, Head, Offer, OpenTopic, RequestAuth, Step,
 };
 
 /// Reads the head of a request, and decides on it.
@@ -24,7 +24,7 @@ pub fn http_head(bytes: &[u8]) {
     }
 }
 
-/// Gives one client's messages to a desk that offers all, and to one that offers nothing: kind, length (two
+/// Gives one client's messages to a session that offers all, and to one that offers nothing: kind, length (two
 /// bytes), message, and so on.
 pub fn client_message(bytes: &[u8]) {
     let service = AdvertisedService {
@@ -55,7 +55,7 @@ pub fn client_message(bytes: &[u8]) {
         Offer::default(),
     );
     for (offer, may_ask) in [(&all, true), (&nothing, false)] {
-        let mut desk = Desk::new(offer);
+        let mut session = ClientSession::new(offer);
         let mut asked = 0_usize;
         let mut rest = bytes;
         while let [kind, low, high, tail @ ..] = rest {
@@ -63,10 +63,10 @@ pub fn client_message(bytes: &[u8]) {
             let (body, tail) = tail.split_at(length);
             rest = tail;
             let step = match kind % 3 {
-                0 => desk.text(&String::from_utf8_lossy(body)),
-                1 => desk.data(body),
+                0 => session.text(&String::from_utf8_lossy(body)),
+                1 => session.data(body),
                 _ => {
-                    desk.answered();
+                    session.answered();
                     asked = asked.saturating_sub(1);
                     Step::Done
                 }

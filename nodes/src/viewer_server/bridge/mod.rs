@@ -19,8 +19,8 @@ use lattice_runtime::{CallError, Node, Publisher, Subscription, SubscriptionExec
 
 pub use self::headset::HeadsetTopics;
 use self::parameters::Parameters;
-use super::desk::Ask;
-use super::hub::Hub;
+use super::broadcaster::Broadcaster;
+use super::client_session::Ask;
 use super::inputs::{Input, InputRefusal, Inputs};
 use super::offer::{Offer, OpenTopic};
 use super::outbox::Outgoing;
@@ -90,12 +90,12 @@ pub struct NodeBridge {
 }
 
 impl NodeBridge {
-    /// A bridge that offers what `reach` allows, and tells the hub of parameters that change. What clients publish
+    /// A bridge that offers what `reach` allows, and tells the broadcaster of parameters that change. What clients publish
     /// for a headset is handed over, for the topics that are given back.
     pub fn new(
         node: &Node,
         reach: &Reach,
-        hub: &Arc<Hub>,
+        broadcaster: &Arc<Broadcaster>,
         (inputs, hand_over): (Arc<Inputs>, HandOver),
     ) -> Result<(Self, HeadsetTopics), NodeError> {
         let (services, clients) = services::of(node, reach)?;
@@ -125,11 +125,11 @@ impl NodeBridge {
         let parameters = Arc::new(Parameters::new(node, nodes)?);
         let mut events = None;
         if reach.allow_write {
-            // The hub holds the bridge.
-            let (hub, parameters) = (Arc::downgrade(hub), Arc::clone(&parameters));
+            // The broadcaster holds the bridge.
+            let (broadcaster, parameters) = (Arc::downgrade(broadcaster), Arc::clone(&parameters));
             let tell = move |event: Arc<ParameterEvent>| {
-                if let Some(hub) = hub.upgrade() {
-                    hub.parameters_changed(&parameters.changed(&event));
+                if let Some(broadcaster) = broadcaster.upgrade() {
+                    broadcaster.parameters_changed(&parameters.changed(&event));
                 }
             };
             let qos = Qos::PARAMETER_EVENTS;

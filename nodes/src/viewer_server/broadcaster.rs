@@ -11,7 +11,7 @@ use smol::channel::{Receiver, bounded};
 
 use super::bridge::Bridge;
 use super::client::Client;
-use super::counts::HubCounts;
+use super::counts::BroadcasterCounts;
 use super::graph::ConnectionGraph;
 use super::inputs::InputRefusal;
 use super::map_stream::{Entry, MapStream};
@@ -23,12 +23,12 @@ use super::protocol::{self, Advertised, Value};
 const MAX_UPDATE_BYTES: usize = 8 << 20;
 
 /// Channels, the map and the clients of a server.
-pub struct Hub {
+pub struct Broadcaster {
     max_clients: usize,
     session: String,
     source: &'static str,
     bridge: OnceLock<Box<dyn Bridge>>,
-    /// That of a hub without a bridge.
+    /// That of a broadcaster without a bridge.
     nothing: Offer,
     inner: Mutex<Inner>,
 }
@@ -38,7 +38,7 @@ struct Inner {
     stream: MapStream,
     clients: BTreeMap<u64, Client>,
     next_client: u64,
-    counts: HubCounts,
+    counts: BroadcasterCounts,
     /// As those who follow it know it.
     graph: ConnectionGraph,
 }
@@ -62,8 +62,8 @@ pub struct Demand {
     pub joined: u64,
 }
 
-impl Hub {
-    /// A hub without channels, for `max_clients`.
+impl Broadcaster {
+    /// A broadcaster without channels, for `max_clients`.
     pub fn new(max_clients: usize) -> Self {
         Self::of("live", max_clients)
     }
@@ -86,7 +86,7 @@ impl Hub {
                 stream: MapStream::new(MAX_UPDATE_BYTES),
                 clients: BTreeMap::new(),
                 next_client: 0,
-                counts: HubCounts::default(),
+                counts: BroadcasterCounts::default(),
                 graph: ConnectionGraph::default(),
             }),
         }
@@ -192,11 +192,11 @@ impl Hub {
     }
 
     /// Counters.
-    pub fn counts(&self) -> HubCounts {
+    pub fn counts(&self) -> BroadcasterCounts {
         let inner = lock(&self.inner);
         let boxes = inner.clients.values().map(|client| &client.outbox);
         let waiting: u64 = boxes.map(Outbox::dropped).sum();
-        HubCounts {
+        BroadcasterCounts {
             maps_restarted: inner.stream.fallen_behind(),
             messages_dropped: inner.counts.messages_dropped + waiting,
             ..inner.counts

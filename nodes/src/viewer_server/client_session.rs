@@ -1,4 +1,4 @@
-//! The desk at which one client asks: what is offered there, what it may ask, how much at a time.
+//! The session at which one client asks: what is offered there, what it may ask, how much at a time.
 
 use std::collections::BTreeMap;
 
@@ -54,15 +54,15 @@ pub enum Step {
 
 /// The state of one client.
 #[derive(Debug)]
-pub struct Desk<'a> {
+pub struct ClientSession<'a> {
     offer: &'a Offer,
     /// Topics of the offer by the client's channels; true for those in JSON.
     channels: BTreeMap<u32, (usize, bool)>,
     in_flight: usize,
 }
 
-impl<'a> Desk<'a> {
-    /// A desk at which nobody has asked.
+impl<'a> ClientSession<'a> {
+    /// A session at which nobody has asked.
     pub fn new(offer: &'a Offer) -> Self {
         Self {
             offer,
@@ -270,7 +270,7 @@ mod tests {
     fn nothing_can_be_written_where_nothing_is_offered() {
         let offer = Offer::default();
         assert!(offer.capabilities().is_empty());
-        let mut desk = Desk::new(&offer);
+        let mut session = ClientSession::new(&offer);
         for text in [
             ADVERTISE,
             WATCH,
@@ -278,56 +278,56 @@ mod tests {
             r#"{"op":"getParameters","parameterNames":[]}"#,
             r#"{"op":"setParameters","parameters":[{"name":"/a.b","value":1}]}"#,
         ] {
-            assert!(matches!(desk.text(text), Step::Tell(_)), "{text}");
+            assert!(matches!(session.text(text), Step::Tell(_)), "{text}");
         }
         for bytes in [call(0, b"cdr"), vec![1, 3, 0, 0, 0, 0, 1, 0, 0]] {
-            assert!(matches!(desk.data(&bytes), Step::Tell(_)));
+            assert!(matches!(session.data(&bytes), Step::Tell(_)));
         }
     }
 
     #[test]
     fn what_is_offered_is_asked_for_up_to_a_number() {
         let offer = offer();
-        let mut desk = Desk::new(&offer);
+        let mut session = ClientSession::new(&offer);
         let refused = [call(1, b"cdr"), call(u32::MAX, b"cdr"), call(0, b"json")];
         for bytes in &refused {
-            let Step::Tell(text) = desk.data(bytes) else {
+            let Step::Tell(text) = session.data(bytes) else {
                 panic!("{bytes:?} was taken");
             };
             assert!(text.contains("serviceCallFailure") && text.contains("\"callId\":7"));
         }
         let names = vec!["/a.b".to_owned()];
-        assert_eq!(desk.text(WATCH), Step::Watch(names.clone(), true));
+        assert_eq!(session.text(WATCH), Step::Watch(names.clone(), true));
         let unwatch = WATCH.replace("subscribe", "unsubscribe");
-        assert_eq!(desk.text(&unwatch), Step::Watch(names, false));
-        assert_eq!(desk.text(GRAPH), Step::Graph(true));
+        assert_eq!(session.text(&unwatch), Step::Watch(names, false));
+        assert_eq!(session.text(GRAPH), Step::Graph(true));
         let unfollow = GRAPH.replace("subscribe", "unsubscribe");
-        assert_eq!(desk.text(&unfollow), Step::Graph(false));
+        assert_eq!(session.text(&unfollow), Step::Graph(false));
         let all = r#"{"op":"subscribeParameterUpdates"}"#;
-        assert_eq!(desk.text(all), Step::Watch(Vec::new(), true));
-        assert_eq!(desk.text(ADVERTISE), Step::Done);
-        assert!(matches!(desk.text(ADVERTISE), Step::Tell(_)), "twice");
+        assert_eq!(session.text(all), Step::Watch(Vec::new(), true));
+        assert_eq!(session.text(ADVERTISE), Step::Done);
+        assert!(matches!(session.text(ADVERTISE), Step::Tell(_)), "twice");
         let other = ADVERTISE
             .replace("goal_pose", "cmd_vel")
             .replace(":3", ":4");
-        assert!(matches!(desk.text(&other), Step::Tell(_)), "not open");
+        assert!(matches!(session.text(&other), Step::Tell(_)), "not open");
         for _ in 0..MAX_IN_FLIGHT - 1 {
             assert!(matches!(
-                desk.data(&call(0, b"cdr")),
+                session.data(&call(0, b"cdr")),
                 Step::Ask(Ask::Call { call: 7, .. })
             ));
         }
         let publish = [1, 3, 0, 0, 0, 9];
-        assert_eq!(desk.data(&publish), Step::Ask(Ask::Publish(0, vec![9])));
-        assert!(matches!(desk.data(&publish), Step::Tell(_)), "too many");
-        desk.answered();
-        assert!(matches!(desk.data(&publish), Step::Ask(_)));
-        desk.answered();
+        assert_eq!(session.data(&publish), Step::Ask(Ask::Publish(0, vec![9])));
+        assert!(matches!(session.data(&publish), Step::Tell(_)), "too many");
+        session.answered();
+        assert!(matches!(session.data(&publish), Step::Ask(_)));
+        session.answered();
         assert_eq!(
-            desk.text(r#"{"op":"unadvertise","channelIds":[3]}"#),
+            session.text(r#"{"op":"unadvertise","channelIds":[3]}"#),
             Step::Done
         );
-        assert!(matches!(desk.data(&publish), Step::Tell(_)), "no longer");
+        assert!(matches!(session.data(&publish), Step::Tell(_)), "no longer");
     }
 
     #[test]
@@ -335,15 +335,15 @@ mod tests {
         let offer = offer();
         assert_eq!(offer.max_message_bytes(), 100_005);
         assert_eq!(Offer::default().max_message_bytes(), MAX_MESSAGE_BYTES);
-        let mut desk = Desk::new(&offer);
+        let mut session = ClientSession::new(&offer);
         let pose = ADVERTISE.replace("/goal_pose", "/headset/pose");
-        assert_eq!(desk.text(&pose), Step::Done);
+        assert_eq!(session.text(&pose), Step::Done);
         let json = pose.replace(":3", ":4").replace("\"cdr", "\"json");
-        assert_eq!(desk.text(&json), Step::Done);
+        assert_eq!(session.text(&json), Step::Done);
         let goal = ADVERTISE.replace(":3", ":5");
-        assert_eq!(desk.text(&goal), Step::Done);
+        assert_eq!(session.text(&goal), Step::Done);
         let json_goal = goal.replace(":5", ":6").replace("\"cdr", "\"json");
-        assert!(matches!(desk.text(&json_goal), Step::Tell(_)));
+        assert!(matches!(session.text(&json_goal), Step::Tell(_)));
         let message = |channel: u8, length: usize| {
             let head = [1, channel, 0, 0, 0];
             [&head[..], &vec![7; length]].concat()
@@ -356,16 +356,16 @@ mod tests {
                     is_json,
                     bytes,
                 };
-                assert_eq!(desk.data(&message(channel, 90_000)), Step::Input(input));
+                assert_eq!(session.data(&message(channel, 90_000)), Step::Input(input));
             }
         }
-        assert!(matches!(desk.data(&message(5, 90_000)), Step::Tell(_)));
-        assert!(matches!(desk.data(&message(5, 1)), Step::Ask(_)));
+        assert!(matches!(session.data(&message(5, 90_000)), Step::Tell(_)));
+        assert!(matches!(session.data(&message(5, 1)), Step::Ask(_)));
         let long = "x".repeat(90_000);
-        assert_eq!(desk.text(&long), tell(TOO_LONG));
+        assert_eq!(session.text(&long), tell(TOO_LONG));
         let mut long = call(0, b"cdr");
         long.resize(90_000, 0);
-        assert!(matches!(desk.data(&long), Step::Tell(text) if text.contains("above 64 kB")));
+        assert!(matches!(session.data(&long), Step::Tell(text) if text.contains("above 64 kB")));
     }
 
     proptest! {
@@ -373,7 +373,7 @@ mod tests {
         #[test]
         fn mutated_messages_do_not_panic(changes in prop::collection::vec((0..200usize, any::<u8>()), 0..8), cut in 0..200usize) {
             let offer = offer();
-            let mut desk = Desk::new(&offer);
+            let mut session = ClientSession::new(&offer);
             for seed in [ADVERTISE.as_bytes(), WATCH.as_bytes(), &call(0, b"cdr")] {
                 let mut bytes = seed.to_vec();
                 for (at, byte) in &changes {
@@ -381,9 +381,9 @@ mod tests {
                     bytes[at] = *byte;
                 }
                 bytes.truncate(cut);
-                desk.data(&bytes);
-                desk.text(&String::from_utf8_lossy(&bytes));
-                prop_assert!(desk.in_flight <= MAX_IN_FLIGHT && desk.channels.len() <= MAX_CHANNELS);
+                session.data(&bytes);
+                session.text(&String::from_utf8_lossy(&bytes));
+                prop_assert!(session.in_flight <= MAX_IN_FLIGHT && session.channels.len() <= MAX_CHANNELS);
             }
         }
     }
