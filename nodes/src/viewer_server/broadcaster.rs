@@ -279,9 +279,9 @@ impl Broadcaster {
     }
 
     /// Puts a message of the protocol before what waits.
-    pub fn tell(&self, id: u64, message: Outgoing) {
+    pub fn enqueue(&self, id: u64, message: Outgoing) {
         if let Some(client) = lock(&self.inner).clients.get_mut(&id) {
-            client.tell(message);
+            client.enqueue(message);
         }
     }
 

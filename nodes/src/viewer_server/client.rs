@@ -46,7 +46,7 @@ impl Client {
     }
 
     /// Puts a message of the protocol before what waits.
-    pub fn tell(&mut self, message: Outgoing) {
+    pub fn enqueue(&mut self, message: Outgoing) {
         self.outbox.answer(message);
         self.wake();
     }
@@ -54,7 +54,7 @@ impl Client {
     /// Tells it of a refusal, where it was not told of one just now.
     pub fn refuse(&mut self, refusal: InputRefusal) {
         if self.refusals.check().is_some() {
-            self.tell(Outgoing::Text(status(refusal.words())));
+            self.enqueue(Outgoing::Text(status(refusal.words())));
         }
     }
 }

@@ -13,7 +13,7 @@ const MAX_CHANNELS: usize = 32;
 
 /// A question that others answer.
 #[derive(Debug, PartialEq)]
-pub enum Ask {
+pub enum BridgeRequest {
     /// Call of a service.
     Call {
         /// Its id.
@@ -33,7 +33,7 @@ pub enum Ask {
 
 /// Consequence of a message of a client.
 #[derive(Debug, PartialEq)]
-pub enum Step {
+pub enum SessionAction {
     /// It wants channels.
     Subscribe(Vec<Wish>),
     /// It wants them no more.
@@ -43,11 +43,11 @@ pub enum Step {
     /// It wants the graph of nodes, or does no longer.
     Graph(bool),
     /// Something is to be asked for.
-    Ask(Ask),
+    Request(BridgeRequest),
     /// A message for a headset's topic, which is not answered.
     Input(Input),
     /// A text for the client.
-    Tell(String),
+    Reply(String),
     /// Nothing.
     Done,
 }
@@ -72,34 +72,35 @@ impl<'a> ClientSession<'a> {
     }
 
     /// Takes a text message.
-    pub fn text(&mut self, text: &str) -> Step {
+    pub fn on_text(&mut self, text: &str) -> SessionAction {
+        use SessionAction::{Done, Graph, Subscribe, Unsubscribe, Watch};
         if text.len() > MAX_MESSAGE_BYTES {
-            return tell(TOO_LONG);
+            return reject(TOO_LONG);
         }
         match ClientMessage::parse(text) {
-            Ok(ClientMessage::Subscribe { subscriptions }) => Step::Subscribe(subscriptions),
-            Ok(ClientMessage::Unsubscribe { subscription_ids }) => {
-                Step::Unsubscribe(subscription_ids)
-            }
+            Ok(ClientMessage::Subscribe { subscriptions }) => Subscribe(subscriptions),
+            Ok(ClientMessage::Unsubscribe { subscription_ids }) => Unsubscribe(subscription_ids),
             Ok(ClientMessage::GetParameters {
                 parameter_names,
                 id,
-            }) if self.offer.parameters => self.ask(Ask::GetParameters(parameter_names, id)),
+            }) if self.offer.parameters => {
+                self.request(BridgeRequest::GetParameters(parameter_names, id))
+            }
             Ok(ClientMessage::SetParameters { parameters, id }) if self.offer.parameters => {
-                self.ask(Ask::SetParameters(parameters, id))
+                self.request(BridgeRequest::SetParameters(parameters, id))
             }
             Ok(ClientMessage::SubscribeParameterUpdates { parameter_names })
                 if self.offer.parameters =>
             {
-                Step::Watch(parameter_names, true)
+                Watch(parameter_names, true)
             }
             Ok(ClientMessage::UnsubscribeParameterUpdates { parameter_names })
                 if self.offer.parameters =>
             {
-                Step::Watch(parameter_names, false)
+                Watch(parameter_names, false)
             }
-            Ok(ClientMessage::SubscribeConnectionGraph) if self.offer.graph => Step::Graph(true),
-            Ok(ClientMessage::UnsubscribeConnectionGraph) => Step::Graph(false),
+            Ok(ClientMessage::SubscribeConnectionGraph) if self.offer.graph => Graph(true),
+            Ok(ClientMessage::UnsubscribeConnectionGraph) => Graph(false),
             Ok(ClientMessage::Advertise { channels }) if !self.offer.topics.is_empty() => {
                 self.advertise(&channels)
             }
@@ -107,19 +108,19 @@ impl<'a> ClientSession<'a> {
                 channel_ids
                     .iter()
                     .for_each(|id| _ = self.channels.remove(id));
-                Step::Done
+                Done
             }
-            Ok(_) => tell("this is not offered here; writing is off unless `allow_write` is on"),
-            Err(error) => tell(&error.to_string()),
+            Ok(_) => reject("this is not offered here; writing is off unless `allow_write` is on"),
+            Err(error) => reject(&error.to_string()),
         }
     }
 
     /// Takes a binary message.
-    pub fn data(&mut self, bytes: &[u8]) -> Step {
+    pub fn on_binary(&mut self, bytes: &[u8]) -> SessionAction {
         match ClientData::parse(bytes) {
             Ok(ClientData::Message { channel, payload }) => self.message(channel, payload),
             Ok(ClientData::Call { service, call, .. }) if bytes.len() > MAX_MESSAGE_BYTES => {
-                Step::Tell(protocol::service_failure(service, call, TOO_LONG))
+                SessionAction::Reply(protocol::service_failure(service, call, TOO_LONG))
             }
             Ok(ClientData::Call {
                 service,
@@ -127,7 +128,8 @@ impl<'a> ClientSession<'a> {
                 encoding,
                 payload,
             }) => {
-                let refuse = |why: &str| Step::Tell(protocol::service_failure(service, call, why));
+                let refuse =
+                    |why: &str| SessionAction::Reply(protocol::service_failure(service, call, why));
                 if service as usize >= self.offer.services.len() {
                     return refuse("there is no such service; `allow_write` may be off");
                 }
@@ -135,35 +137,35 @@ impl<'a> ClientSession<'a> {
                     return refuse("requests are taken as cdr alone");
                 }
                 let request = payload.to_vec();
-                match self.ask(Ask::Call {
+                match self.request(BridgeRequest::Call {
                     service,
                     call,
                     request,
                 }) {
-                    Step::Tell(_) => refuse(TOO_MANY),
+                    SessionAction::Reply(_) => refuse(TOO_MANY),
                     step => step,
                 }
             }
-            Err(error) => tell(&error.to_string()),
+            Err(error) => reject(&error.to_string()),
         }
     }
 
-    fn message(&mut self, channel: u32, payload: &[u8]) -> Step {
+    fn message(&mut self, channel: u32, payload: &[u8]) -> SessionAction {
         let Some(&(topic, is_json)) = self.channels.get(&channel) else {
-            return tell(&format!("channel {channel} is not yours to publish on"));
+            return reject(&format!("channel {channel} is not yours to publish on"));
         };
         let streams = self.offer.topics.get(topic);
         if streams.is_some_and(|topic| topic.stream_bytes.is_some()) {
             let bytes = payload.to_vec();
-            return Step::Input(Input {
+            return SessionAction::Input(Input {
                 topic,
                 is_json,
                 bytes,
             });
         }
         match payload.len() > MAX_MESSAGE_BYTES {
-            true => tell(TOO_LONG),
-            false => self.ask(Ask::Publish(topic, payload.to_vec())),
+            true => reject(TOO_LONG),
+            false => self.request(BridgeRequest::Publish(topic, payload.to_vec())),
         }
     }
 
@@ -172,15 +174,15 @@ impl<'a> ClientSession<'a> {
         self.in_flight = self.in_flight.saturating_sub(1);
     }
 
-    fn ask(&mut self, ask: Ask) -> Step {
+    fn request(&mut self, request: BridgeRequest) -> SessionAction {
         if self.in_flight >= MAX_IN_FLIGHT {
-            return tell(TOO_MANY);
+            return reject(TOO_MANY);
         }
         self.in_flight += 1;
-        Step::Ask(ask)
+        SessionAction::Request(request)
     }
 
-    fn advertise(&mut self, channels: &[ClientChannel]) -> Step {
+    fn advertise(&mut self, channels: &[ClientChannel]) -> SessionAction {
         for channel in channels {
             let fits = |topic: &OpenTopic| {
                 topic.name == channel.topic && topic.type_name == channel.schema_name
@@ -196,18 +198,18 @@ impl<'a> ClientSession<'a> {
             let is_read = |at: &usize| channel.encoding == "cdr" || is_json && streams(*at);
             match topic.filter(|at| room && free && is_read(at)) {
                 Some(topic) => _ = self.channels.insert(channel.id, (topic, is_json)),
-                None => return tell(&refusal(channel, &self.offer.topics)),
+                None => return reject(&refusal(channel, &self.offer.topics)),
             }
         }
-        Step::Done
+        SessionAction::Done
     }
 }
 
 const TOO_LONG: &str = "a message above 64 kB";
 const TOO_MANY: &str = "too many questions wait for their answers";
 
-fn tell(problem: &str) -> Step {
-    Step::Tell(protocol::status(problem))
+fn reject(problem: &str) -> SessionAction {
+    SessionAction::Reply(protocol::status(problem))
 }
 
 fn refusal(channel: &ClientChannel, topics: &[OpenTopic]) -> String {
@@ -223,6 +225,7 @@ fn refusal(channel: &ClientChannel, topics: &[OpenTopic]) -> String {
 mod tests {
     use proptest::prelude::*;
 
+    use super::SessionAction::{Done, Graph, Reply, Request, Watch};
     use super::*;
     use crate::viewer_server::protocol::AdvertisedService;
 
@@ -278,10 +281,10 @@ mod tests {
             r#"{"op":"getParameters","parameterNames":[]}"#,
             r#"{"op":"setParameters","parameters":[{"name":"/a.b","value":1}]}"#,
         ] {
-            assert!(matches!(session.text(text), Step::Tell(_)), "{text}");
+            assert!(matches!(session.on_text(text), Reply(_)), "{text}");
         }
         for bytes in [call(0, b"cdr"), vec![1, 3, 0, 0, 0, 0, 1, 0, 0]] {
-            assert!(matches!(session.data(&bytes), Step::Tell(_)));
+            assert!(matches!(session.on_binary(&bytes), Reply(_)));
         }
     }
 
@@ -291,43 +294,46 @@ mod tests {
         let mut session = ClientSession::new(&offer);
         let refused = [call(1, b"cdr"), call(u32::MAX, b"cdr"), call(0, b"json")];
         for bytes in &refused {
-            let Step::Tell(text) = session.data(bytes) else {
+            let Reply(text) = session.on_binary(bytes) else {
                 panic!("{bytes:?} was taken");
             };
             assert!(text.contains("serviceCallFailure") && text.contains("\"callId\":7"));
         }
         let names = vec!["/a.b".to_owned()];
-        assert_eq!(session.text(WATCH), Step::Watch(names.clone(), true));
+        assert_eq!(session.on_text(WATCH), Watch(names.clone(), true));
         let unwatch = WATCH.replace("subscribe", "unsubscribe");
-        assert_eq!(session.text(&unwatch), Step::Watch(names, false));
-        assert_eq!(session.text(GRAPH), Step::Graph(true));
+        assert_eq!(session.on_text(&unwatch), Watch(names, false));
+        assert_eq!(session.on_text(GRAPH), Graph(true));
         let unfollow = GRAPH.replace("subscribe", "unsubscribe");
-        assert_eq!(session.text(&unfollow), Step::Graph(false));
+        assert_eq!(session.on_text(&unfollow), Graph(false));
         let all = r#"{"op":"subscribeParameterUpdates"}"#;
-        assert_eq!(session.text(all), Step::Watch(Vec::new(), true));
-        assert_eq!(session.text(ADVERTISE), Step::Done);
-        assert!(matches!(session.text(ADVERTISE), Step::Tell(_)), "twice");
+        assert_eq!(session.on_text(all), Watch(Vec::new(), true));
+        assert_eq!(session.on_text(ADVERTISE), Done);
+        assert!(matches!(session.on_text(ADVERTISE), Reply(_)), "twice");
         let other = ADVERTISE
             .replace("goal_pose", "cmd_vel")
             .replace(":3", ":4");
-        assert!(matches!(session.text(&other), Step::Tell(_)), "not open");
+        assert!(matches!(session.on_text(&other), Reply(_)), "not open");
         for _ in 0..MAX_IN_FLIGHT - 1 {
             assert!(matches!(
-                session.data(&call(0, b"cdr")),
-                Step::Ask(Ask::Call { call: 7, .. })
+                session.on_binary(&call(0, b"cdr")),
+                Request(BridgeRequest::Call { call: 7, .. })
             ));
         }
         let publish = [1, 3, 0, 0, 0, 9];
-        assert_eq!(session.data(&publish), Step::Ask(Ask::Publish(0, vec![9])));
-        assert!(matches!(session.data(&publish), Step::Tell(_)), "too many");
+        assert_eq!(
+            session.on_binary(&publish),
+            Request(BridgeRequest::Publish(0, vec![9]))
+        );
+        assert!(matches!(session.on_binary(&publish), Reply(_)), "too many");
         session.answered();
-        assert!(matches!(session.data(&publish), Step::Ask(_)));
+        assert!(matches!(session.on_binary(&publish), Request(_)));
         session.answered();
         assert_eq!(
-            session.text(r#"{"op":"unadvertise","channelIds":[3]}"#),
-            Step::Done
+            session.on_text(r#"{"op":"unadvertise","channelIds":[3]}"#),
+            Done
         );
-        assert!(matches!(session.data(&publish), Step::Tell(_)), "no longer");
+        assert!(matches!(session.on_binary(&publish), Reply(_)), "no longer");
     }
 
     #[test]
@@ -337,13 +343,13 @@ mod tests {
         assert_eq!(Offer::default().max_message_bytes(), MAX_MESSAGE_BYTES);
         let mut session = ClientSession::new(&offer);
         let pose = ADVERTISE.replace("/goal_pose", "/headset/pose");
-        assert_eq!(session.text(&pose), Step::Done);
+        assert_eq!(session.on_text(&pose), Done);
         let json = pose.replace(":3", ":4").replace("\"cdr", "\"json");
-        assert_eq!(session.text(&json), Step::Done);
+        assert_eq!(session.on_text(&json), Done);
         let goal = ADVERTISE.replace(":3", ":5");
-        assert_eq!(session.text(&goal), Step::Done);
+        assert_eq!(session.on_text(&goal), Done);
         let json_goal = goal.replace(":5", ":6").replace("\"cdr", "\"json");
-        assert!(matches!(session.text(&json_goal), Step::Tell(_)));
+        assert!(matches!(session.on_text(&json_goal), Reply(_)));
         let message = |channel: u8, length: usize| {
             let head = [1, channel, 0, 0, 0];
             [&head[..], &vec![7; length]].concat()
@@ -356,16 +362,19 @@ mod tests {
                     is_json,
                     bytes,
                 };
-                assert_eq!(session.data(&message(channel, 90_000)), Step::Input(input));
+                assert_eq!(
+                    session.on_binary(&message(channel, 90_000)),
+                    SessionAction::Input(input)
+                );
             }
         }
-        assert!(matches!(session.data(&message(5, 90_000)), Step::Tell(_)));
-        assert!(matches!(session.data(&message(5, 1)), Step::Ask(_)));
+        assert!(matches!(session.on_binary(&message(5, 90_000)), Reply(_)));
+        assert!(matches!(session.on_binary(&message(5, 1)), Request(_)));
         let long = "x".repeat(90_000);
-        assert_eq!(session.text(&long), tell(TOO_LONG));
+        assert_eq!(session.on_text(&long), reject(TOO_LONG));
         let mut long = call(0, b"cdr");
         long.resize(90_000, 0);
-        assert!(matches!(session.data(&long), Step::Tell(text) if text.contains("above 64 kB")));
+        assert!(matches!(session.on_binary(&long), Reply(text) if text.contains("above 64 kB")));
     }
 
     proptest! {
@@ -381,8 +390,8 @@ mod tests {
                     bytes[at] = *byte;
                 }
                 bytes.truncate(cut);
-                session.data(&bytes);
-                session.text(&String::from_utf8_lossy(&bytes));
+                session.on_binary(&bytes);
+                session.on_text(&String::from_utf8_lossy(&bytes));
                 prop_assert!(session.in_flight <= MAX_IN_FLIGHT && session.channels.len() <= MAX_CHANNELS);
             }
         }

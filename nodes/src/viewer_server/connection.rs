@@ -17,7 +17,7 @@ use smol::future::{or, pending, poll_once, yield_now};
 use smol::{Async, Timer};
 
 use super::broadcaster::Broadcaster;
-use super::client_session::{ClientSession, Step};
+use super::client_session::{ClientSession, SessionAction};
 use super::flow::Flow;
 use super::http::{Decision, Head, HeadError, MAX_HEAD_BYTES, RequestAuth, Response};
 use super::inputs::{Input, InputRefusal};
@@ -160,13 +160,13 @@ async fn talk(
             yield_now().await;
         }
         let step = match event {
-            Event::Woken => Step::Done,
+            Event::Woken => SessionAction::Done,
             Event::Answered(messages) => {
                 session.answered();
                 messages
                     .into_iter()
-                    .for_each(|message| broadcaster.tell(id, message));
-                Step::Done
+                    .for_each(|message| broadcaster.enqueue(id, message));
+                SessionAction::Done
             }
             // Before anything is made of it.
             Event::Come(Some(Ok(message))) if !is_paced(&mut flow, message.len()) => {
@@ -175,18 +175,18 @@ async fn talk(
                     bridge.inputs().refused(refusal);
                 }
                 broadcaster.refuse(id, refusal);
-                Step::Done
+                SessionAction::Done
             }
-            Event::Come(Some(Ok(Message::Text(text)))) => session.text(&text),
-            Event::Come(Some(Ok(Message::Binary(bytes)))) => session.data(&bytes),
+            Event::Come(Some(Ok(Message::Text(text)))) => session.on_text(&text),
+            Event::Come(Some(Ok(Message::Binary(bytes)))) => session.on_binary(&bytes),
             Event::Come(Some(Ok(Message::Close(_))) | None) => return Ok(()),
             // Before more is read, or a client that pings without end would fill the memory with answers.
             Event::Come(Some(Ok(Message::Ping(_)))) => {
                 let answer = async { socket.flush().await.map_err(io::Error::other) };
                 progress.sent(answer).await?;
-                Step::Done
+                SessionAction::Done
             }
-            Event::Come(Some(Ok(_))) => Step::Done,
+            Event::Come(Some(Ok(_))) => SessionAction::Done,
             Event::Come(Some(Err(error))) => {
                 if matches!(error, tungstenite::Error::Capacity(_)) {
                     too_long(&mut socket, broadcaster).await;
@@ -195,25 +195,27 @@ async fn talk(
             }
         };
         match step {
-            Step::Subscribe(wishes) => {
+            SessionAction::Subscribe(wishes) => {
                 for wish in wishes {
                     broadcaster.subscribe(id, wish.id, wish.channel_id);
                 }
             }
-            Step::Watch(names, watch) => broadcaster.watch(id, names, watch),
-            Step::Graph(follow) => broadcaster.follow_graph(id, follow),
-            Step::Unsubscribe(subscriptions) => broadcaster.unsubscribe(id, &subscriptions),
-            Step::Ask(ask) => match broadcaster.bridge() {
-                Some(bridge) => asked.push(bridge.ask(ask)),
+            SessionAction::Watch(names, watch) => broadcaster.watch(id, names, watch),
+            SessionAction::Graph(follow) => broadcaster.follow_graph(id, follow),
+            SessionAction::Unsubscribe(subscriptions) => {
+                broadcaster.unsubscribe(id, &subscriptions)
+            }
+            SessionAction::Request(request) => match broadcaster.bridge() {
+                Some(bridge) => asked.push(bridge.request(request)),
                 None => session.answered(),
             },
-            Step::Input(input) => {
+            SessionAction::Input(input) => {
                 if let Some(refusal) = take(broadcaster, id, &mut flow, input) {
                     broadcaster.refuse(id, refusal);
                 }
             }
-            Step::Tell(text) => broadcaster.tell(id, Outgoing::Text(text)),
-            Step::Done => {}
+            SessionAction::Reply(text) => broadcaster.enqueue(id, Outgoing::Text(text)),
+            SessionAction::Done => {}
         }
     }
 }

@@ -31,7 +31,7 @@ mod watched;
 
 pub use bridge::Bridge;
 pub use broadcaster::{Broadcaster, Demand};
-pub use client_session::{Ask, ClientSession, Step};
+pub use client_session::{BridgeRequest, ClientSession, SessionAction};
 pub use counts::BroadcasterCounts;
 pub use fixed::{serve, serve_labelled};
 pub use graph::ConnectionGraph;

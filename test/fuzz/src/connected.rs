@@ -1,7 +1,7 @@
 //! Bodies of the targets of what clients of the viewer send: heads of requests, messages of the protocol.
 
 use lattice_nodes::viewer_server::{
-    AdvertisedService, ClientSession, Head, Offer, OpenTopic, RequestAuth, Step,
+    AdvertisedService, ClientSession, Head, Offer, OpenTopic, RequestAuth, SessionAction,
 };
 
 /// Reads the head of a request, and decides on it.
@@ -63,20 +63,20 @@ pub fn client_message(bytes: &[u8]) {
             let (body, tail) = tail.split_at(length);
             rest = tail;
             let step = match kind % 3 {
-                0 => session.text(&String::from_utf8_lossy(body)),
-                1 => session.data(body),
+                0 => session.on_text(&String::from_utf8_lossy(body)),
+                1 => session.on_binary(body),
                 _ => {
                     session.answered();
                     asked = asked.saturating_sub(1);
-                    Step::Done
+                    SessionAction::Done
                 }
             };
             match step {
-                Step::Ask(_) => {
+                SessionAction::Request(_) => {
                     asked += 1;
                     assert!(may_ask && asked <= 16);
                 }
-                Step::Input(input) => assert!(may_ask && input.topic == 1),
+                SessionAction::Input(input) => assert!(may_ask && input.topic == 1),
                 _ => {}
             }
         }

@@ -20,7 +20,7 @@ use lattice_runtime::{CallError, Node, Publisher, Subscription, SubscriptionExec
 pub use self::headset::HeadsetTopics;
 use self::parameters::Parameters;
 use super::broadcaster::Broadcaster;
-use super::client_session::Ask;
+use super::client_session::BridgeRequest;
 use super::inputs::{Input, InputRefusal, Inputs};
 use super::offer::{Offer, OpenTopic};
 use super::outbox::Outgoing;
@@ -38,7 +38,7 @@ pub trait Bridge: Send + Sync {
     fn offer(&self) -> &Offer;
 
     /// Asks; gives messages for the client. Dropping the future ends the question.
-    fn ask(&self, ask: Ask) -> BoxFuture<'static, Vec<Outgoing>>;
+    fn request(&self, request: BridgeRequest) -> BoxFuture<'static, Vec<Outgoing>>;
 
     /// Hands a client's message for a headset's topic over, at once, or says why not.
     fn take(&self, client: u64, input: Input) -> Result<(), InputRefusal>;
@@ -178,9 +178,9 @@ impl Bridge for NodeBridge {
         &self.inputs
     }
 
-    fn ask(&self, ask: Ask) -> BoxFuture<'static, Vec<Outgoing>> {
-        match ask {
-            Ask::Call {
+    fn request(&self, request: BridgeRequest) -> BoxFuture<'static, Vec<Outgoing>> {
+        match request {
+            BridgeRequest::Call {
                 service,
                 call,
                 request,
@@ -201,15 +201,15 @@ impl Bridge for NodeBridge {
                     }]
                 })
             }
-            Ask::GetParameters(names, id) => {
+            BridgeRequest::GetParameters(names, id) => {
                 let values = self.parameters.get(names);
                 Box::pin(async move { told(values.await, id) })
             }
-            Ask::SetParameters(parameters, id) => {
+            BridgeRequest::SetParameters(parameters, id) => {
                 let values = self.parameters.set(parameters);
                 Box::pin(async move { told(values.await, id) })
             }
-            Ask::Publish(_, message) => {
+            BridgeRequest::Publish(_, message) => {
                 let problem = self.publish(&message).err();
                 let told = problem.map(|why| Outgoing::Text(status(&why)));
                 Box::pin(async move { told.into_iter().collect() })
