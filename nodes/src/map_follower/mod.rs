@@ -267,7 +267,7 @@ impl MapFollower {
 
     /// Waits one second more for what is incomplete; true if a keyframe is to be asked for, since
     /// nothing more has come of it. To be called once a second.
-    pub fn wait_a_second(&mut self) -> bool {
+    pub fn check_keyframe_timeout(&mut self) -> bool {
         self.still_s = self.still_s.saturating_add(1);
         let incomplete = self.staging.is_some() || !self.open_updates.is_empty();
         if !incomplete && !self.keyframe_needed {

@@ -138,9 +138,10 @@ impl MapMerger {
     }
 
     /// Waits a second more for what is incomplete; gives the robots whose keyframe is to be asked for.
-    pub fn wait_a_second(&mut self) -> Vec<usize> {
+    pub fn check_keyframe_timeout(&mut self) -> Vec<usize> {
         let waiting = self.shares.iter_mut().enumerate();
-        let waiting = waiting.filter_map(|(i, share)| share.follower.wait_a_second().then_some(i));
+        let waiting =
+            waiting.filter_map(|(i, share)| share.follower.check_keyframe_timeout().then_some(i));
         waiting.collect()
     }
 

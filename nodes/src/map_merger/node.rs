@@ -159,7 +159,7 @@ impl Shell {
     fn publish(&mut self) {
         self.inputs.iter_mut().for_each(MapRequests::make_good);
         if self.seconds.check().is_some() {
-            for robot in self.machine.wait_a_second() {
+            for robot in self.machine.check_keyframe_timeout() {
                 if let Some(input) = self.inputs.get(robot) {
                     input.ask_for_keyframe();
                 }

@@ -161,8 +161,8 @@ impl SemanticIcpServer {
     }
 
     /// Asks for a keyframe if nothing more comes of an incomplete one. To be called once a second.
-    pub fn wait_a_second(&mut self) -> Option<Output> {
-        let overdue = self.follower.wait_a_second();
+    pub fn check_keyframe_timeout(&mut self) -> Option<Output> {
+        let overdue = self.follower.check_keyframe_timeout();
         overdue.then_some(Output::NeedKeyframe)
     }
 

@@ -256,7 +256,7 @@ impl Shell {
             Event::Tick => self.machine.tick(now_ns).into_iter().collect(),
             Event::Diagnose => {
                 self.diagnose();
-                let overdue = self.machine.wait_a_second();
+                let overdue = self.machine.check_keyframe_timeout();
                 let lost = self.map_lost.swap(false, Ordering::Relaxed);
                 overdue
                     .or(lost.then_some(Output::NeedKeyframe))

@@ -63,8 +63,8 @@ impl MapSource {
     }
 
     /// To be called once a second; true if a keyframe is to be asked for.
-    pub fn wait_a_second(&mut self) -> bool {
-        self.follower.wait_a_second()
+    pub fn check_keyframe_timeout(&mut self) -> bool {
+        self.follower.check_keyframe_timeout()
     }
 
     /// The map as far as it is known.

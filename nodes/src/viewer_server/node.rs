@@ -225,7 +225,7 @@ impl Shell {
     fn tick(&mut self) {
         self.input.make_good();
         let second = self.seconds.check().is_some();
-        if second && self.source.wait_a_second() {
+        if second && self.source.check_keyframe_timeout() {
             self.input.ask_for_keyframe();
         }
         if let Some(parts) = &mut self.parts {

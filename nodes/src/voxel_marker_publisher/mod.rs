@@ -167,8 +167,8 @@ impl VoxelMarkers {
 
     /// True if a keyframe is to be asked for, since nothing more comes of an incomplete one. To be
     /// called once a second.
-    pub fn wait_a_second(&mut self) -> bool {
-        self.follower.wait_a_second()
+    pub fn check_keyframe_timeout(&mut self) -> bool {
+        self.follower.check_keyframe_timeout()
     }
 
     /// Blocks that changed since they were drawn.

@@ -107,7 +107,7 @@ impl Shell {
             Event::Redraw => self.machine.redraw(),
             Event::Draw => {
                 self.input.make_good();
-                if self.seconds.check().is_some() && self.machine.wait_a_second() {
+                if self.seconds.check().is_some() && self.machine.check_keyframe_timeout() {
                     self.input.ask_for_keyframe();
                 }
                 self.draw();
