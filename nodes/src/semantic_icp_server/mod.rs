@@ -93,7 +93,7 @@ pub struct SemanticIcpServer {
     look: Option<(Arc<HeadsetScan>, i64)>,
     next_job: u64,
     /// Confusions of labels learned so far are of another session, segmenter or map.
-    unlearn: bool,
+    reset_label_confusion: bool,
     /// State of the map that the searcher has: epoch, sequence, and when.
     prepared: Option<(u64, Option<u64>, i64)>,
     last: CalibrationResult,
@@ -120,7 +120,7 @@ impl SemanticIcpServer {
             fresh_cloud: false,
             look: None,
             next_job: 0,
-            unlearn: false,
+            reset_label_confusion: false,
             prepared: None,
             last: CalibrationResult::default(),
             published_ns: 0,
@@ -152,7 +152,7 @@ impl SemanticIcpServer {
             }
         }
         let (_, replaced) = self.follower.take_touched();
-        self.unlearn |= replaced;
+        self.reset_label_confusion |= replaced;
         if replaced && self.prepared.is_some() {
             // Its frame may be another one.
             self.forget("the map is a new one", now_ns, &mut out);
@@ -176,7 +176,7 @@ impl SemanticIcpServer {
             .collect();
         if self.names != names {
             self.names = names;
-            self.unlearn = true;
+            self.reset_label_confusion = true;
         }
     }
 
@@ -186,7 +186,7 @@ impl SemanticIcpServer {
         let session: String = message.data.chars().take(256).collect();
         if session != self.session {
             self.counts.sessions += 1;
-            self.unlearn = true;
+            self.reset_label_confusion = true;
             self.session = session;
             self.headset_scans.clear();
             self.forget("the headset has begun a new session", now_ns, &mut out);

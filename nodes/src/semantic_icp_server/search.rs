@@ -25,7 +25,7 @@ pub struct MapCloud {
 /// Finds poses; made for the thread that calculates.
 pub trait Search: Send + 'static {
     /// Forgets the confusions of labels that it learned.
-    fn unlearn(&mut self);
+    fn reset_label_confusion(&mut self);
 
     /// Makes a map ready, for all that follows. The error says why it cannot be used.
     fn prepare(&mut self, map: MapCloud) -> Result<(), String>;
@@ -74,7 +74,7 @@ impl LatticeSearch {
 }
 
 impl Search for LatticeSearch {
-    fn unlearn(&mut self) {
+    fn reset_label_confusion(&mut self) {
         self.confusion = None;
     }
 
@@ -148,7 +148,7 @@ pub struct Job {
     /// Its number.
     pub id: u64,
     /// Confusions of labels learned before do not hold any more.
-    pub unlearn: bool,
+    pub reset_label_confusion: bool,
     /// A map to be made ready first.
     pub map: Option<MapCloud>,
     /// Work of a job.
@@ -186,8 +186,8 @@ impl<F: Fn(Stage, f64) + Sync> Progress for Watch<'_, F> {
 impl Job {
     /// Calculates; `on_progress` is called with the stage and its fraction.
     pub fn run(self, search: &mut dyn Search, on_progress: impl Fn(Stage, f64) + Sync) -> Done {
-        if self.unlearn {
-            search.unlearn();
+        if self.reset_label_confusion {
+            search.reset_label_confusion();
         }
         if let Some(map) = self.map
             && let Err(reason) = search.prepare(map)

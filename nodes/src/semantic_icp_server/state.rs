@@ -142,7 +142,7 @@ impl SemanticIcpServer {
         };
         out.push(Output::Job(Job {
             id: self.next_job,
-            unlearn: std::mem::take(&mut self.unlearn),
+            reset_label_confusion: std::mem::take(&mut self.reset_label_confusion),
             map: self.map_to_prepare(now_ns, map_age_ns),
             work,
             canceled: Arc::clone(&running.canceled),

@@ -43,7 +43,7 @@ pub fn found(verdict: Verdict, x: f64) -> Calibration {
 }
 
 impl Search for Fake {
-    fn unlearn(&mut self) {
+    fn reset_label_confusion(&mut self) {
         self.unlearned += 1;
     }
 
