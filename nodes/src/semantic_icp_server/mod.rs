@@ -36,7 +36,7 @@ use lattice_msgs::vision_msgs::LabelInfo;
 use nalgebra::Isometry3;
 
 use self::headset_scans::HeadsetScans;
-use self::state::{Known, Running, Wanted};
+use self::state::{Known, PendingRequest, Running};
 use crate::convert::calibration::{result_from, set_pose};
 use crate::convert::geometry;
 use crate::map_follower::{FollowError, Followed, MapFollower};
@@ -86,7 +86,7 @@ pub struct SemanticIcpServer {
     /// Time from which a look that fits somewhat may be doubted again.
     doubt_again_ns: i64,
     running: Option<Running>,
-    wanted: Option<Wanted>,
+    pending: Option<PendingRequest>,
     /// A cloud came that no search has used.
     fresh_cloud: bool,
     /// The newest cloud that the known pose is still to be refined by, and its stamp.
@@ -116,7 +116,7 @@ impl SemanticIcpServer {
             misses: 0,
             doubt_again_ns: 0,
             running: None,
-            wanted: None,
+            pending: None,
             fresh_cloud: false,
             look: None,
             next_job: 0,
@@ -201,8 +201,8 @@ impl SemanticIcpServer {
         self.doubt_again_ns = 0;
         self.fresh_cloud = false;
         self.look = None;
-        if let Some(wanted) = self.wanted.take() {
-            self.answer_failed(wanted.caller, why, out);
+        if let Some(pending) = self.pending.take() {
+            self.answer_failed(pending.caller, why, out);
         }
         self.end_running(why, out);
         let result = self.result(CalibrationResult::NONE, why);
@@ -224,7 +224,7 @@ impl SemanticIcpServer {
         };
         let caller = Some(call);
         let asked = self.running.as_ref().is_some_and(|r| r.caller.is_some());
-        if asked || self.wanted.is_some() {
+        if asked || self.pending.is_some() {
             if self.options.when_busy == WhenBusy::Reject {
                 self.counts.requests_busy += 1;
                 let reason = "busy: a calibration that was asked for before is at work";
@@ -232,8 +232,8 @@ impl SemanticIcpServer {
                 return out;
             }
             let why = "superseded by another request";
-            let wanted = self.wanted.take().and_then(|wanted| wanted.caller);
-            self.answer_failed(wanted, why, &mut out);
+            let pending = self.pending.take().and_then(|pending| pending.caller);
+            self.answer_failed(pending, why, &mut out);
             self.end_running(why, &mut out);
         } else if let Some(running) = self.running.as_mut().filter(|r| !r.tracking) {
             if start.is_none() && !running.outdated {
@@ -243,7 +243,7 @@ impl SemanticIcpServer {
             }
             self.end_running("superseded by a request", &mut out);
         }
-        self.wanted = Some(Wanted { caller, start });
+        self.pending = Some(PendingRequest { caller, start });
         self.go_on(now_ns, &mut out);
         out
     }
@@ -276,7 +276,7 @@ impl SemanticIcpServer {
     /// A client does not want its request any more.
     pub fn cancel(&mut self, call: CallId) -> Vec<Output> {
         let mut out = Vec::new();
-        let mut was_asked = self.wanted.take_if(|w| w.caller == Some(call)).is_some();
+        let mut was_asked = self.pending.take_if(|w| w.caller == Some(call)).is_some();
         let running = self.running.as_mut();
         if let Some(running) = running.filter(|r| r.caller == Some(call)) {
             running.canceled.store(true, Relaxed);
@@ -333,8 +333,8 @@ impl SemanticIcpServer {
     pub fn finish(&mut self) -> Vec<Output> {
         let mut out = Vec::new();
         let why = "the server ends";
-        let wanted = self.wanted.take().and_then(|wanted| wanted.caller);
-        self.answer_failed(wanted, why, &mut out);
+        let pending = self.pending.take().and_then(|pending| pending.caller);
+        self.answer_failed(pending, why, &mut out);
         self.end_running(why, &mut out);
         out
     }

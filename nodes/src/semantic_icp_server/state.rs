@@ -2,9 +2,9 @@
 
 use super::*;
 
-/// A search that is to begin as soon as it can, and who waits for it.
+/// A search request that waits for the running job, with its caller.
 #[derive(Default)]
-pub(super) struct Wanted {
+pub(super) struct PendingRequest {
     pub caller: Option<CallId>,
     pub start: Option<Isometry3<f64>>,
 }
@@ -62,8 +62,8 @@ impl SemanticIcpServer {
         if self.running.is_some() {
             return;
         }
-        if let Some(wanted) = self.wanted.take() {
-            self.search_all(wanted, now_ns, out);
+        if let Some(pending) = self.pending.take() {
+            self.search_all(pending, now_ns, out);
             return;
         }
         if let Some((headset_scan, stamp_ns)) = self.look.take() {
@@ -82,7 +82,7 @@ impl SemanticIcpServer {
         let due = self.fresh_cloud && self.known.is_none() && !self.headset_scans.is_empty();
         if due && self.options.search == SearchWhen::Lost && self.has_map() {
             self.counts.clouds_searched += 1;
-            self.search_all(Wanted::default(), now_ns, out);
+            self.search_all(PendingRequest::default(), now_ns, out);
         }
     }
 
@@ -91,25 +91,25 @@ impl SemanticIcpServer {
     pub(super) fn confirm(&mut self, now_ns: i64, out: &mut Vec<Output>) {
         let looks = self.headset_scans.len();
         let is_due = self.known.as_ref().is_some_and(|known| looks > known.looks);
-        let is_free = self.running.is_none() && self.wanted.is_none();
+        let is_free = self.running.is_none() && self.pending.is_none();
         if !is_due || !is_free || self.options.search != SearchWhen::Lost {
             return;
         }
-        self.search_all(Wanted::default(), now_ns, out);
+        self.search_all(PendingRequest::default(), now_ns, out);
         if let Some(running) = &mut self.running {
             running.confirms = true;
         }
     }
 
     /// Begins a search with all clouds that are kept.
-    fn search_all(&mut self, wanted: Wanted, now_ns: i64, out: &mut Vec<Output>) {
+    fn search_all(&mut self, pending: PendingRequest, now_ns: i64, out: &mut Vec<Output>) {
         self.fresh_cloud = false;
         let work = Work::Calibrate {
             headset_scans: self.headset_scans.all(),
-            start: wanted.start,
+            start: pending.start,
         };
         let stamp_ns = self.headset_scans.stamp_ns();
-        self.begin(work, wanted.caller, stamp_ns, now_ns, out);
+        self.begin(work, pending.caller, stamp_ns, now_ns, out);
     }
 
     /// Makes a job of the work, with the map if the searcher has an old one.
