@@ -40,7 +40,7 @@ impl SemanticIcpServer {
             self.publish(result, now_ns, &mut out);
             return out;
         }
-        if self.known.is_some() && self.options.track {
+        if self.current.is_some() && self.options.track {
             self.look = Some((headset_scan, stamp_ns));
         } else {
             self.headset_scans.push(headset_scan, stamp_ns, now_ns);

@@ -36,7 +36,7 @@ use lattice_msgs::vision_msgs::LabelInfo;
 use nalgebra::Isometry3;
 
 use self::headset_scans::HeadsetScans;
-use self::state::{Known, PendingRequest, Running};
+use self::state::{CurrentCalibration, PendingRequest, Running};
 use crate::convert::calibration::{result_from, set_pose};
 use crate::convert::geometry;
 use crate::map_follower::{FollowError, Followed, MapFollower};
@@ -80,7 +80,7 @@ pub struct SemanticIcpServer {
     headset_scans: HeadsetScans,
     /// Class names of the headset.
     names: BTreeMap<u16, String>,
-    known: Option<Known>,
+    current: Option<CurrentCalibration>,
     /// Searches in a row that did not find the headset where it was.
     misses: u32,
     /// Time from which a look that fits somewhat may be doubted again.
@@ -112,7 +112,7 @@ impl SemanticIcpServer {
                 options.headset_scan_period_ns,
             ),
             names: BTreeMap::new(),
-            known: None,
+            current: None,
             misses: 0,
             doubt_again_ns: 0,
             running: None,
@@ -196,7 +196,7 @@ impl SemanticIcpServer {
 
     /// Drops the known pose and ends what is at work.
     fn forget(&mut self, why: &str, now_ns: i64, out: &mut Vec<Output>) {
-        self.known = None;
+        self.current = None;
         self.misses = 0;
         self.doubt_again_ns = 0;
         self.fresh_cloud = false;
@@ -325,8 +325,8 @@ impl SemanticIcpServer {
 
     /// Publishes the transform again, for those who have come late. To be called now and then.
     pub fn tick(&mut self, now_ns: i64) -> Option<Output> {
-        let known = self.known.as_ref()?;
-        Some(Output::Transform(self.transform(known, now_ns)))
+        let current = self.current.as_ref()?;
+        Some(Output::Transform(self.transform(current, now_ns)))
     }
 
     /// Ends everything: whoever waits is answered.
@@ -346,7 +346,9 @@ impl SemanticIcpServer {
 
     /// `map_from_headset_origin`, while it is known.
     pub fn map_from_headset(&self) -> Option<Isometry3<f64>> {
-        self.known.as_ref().map(|known| known.map_from_headset)
+        self.current
+            .as_ref()
+            .map(|current| current.map_from_headset)
     }
 
     /// The newest result.
@@ -373,12 +375,12 @@ impl SemanticIcpServer {
         self.map_voxels() > 0
     }
 
-    fn transform(&self, known: &Known, now_ns: i64) -> TransformStamped {
+    fn transform(&self, current: &CurrentCalibration, now_ns: i64) -> TransformStamped {
         geometry::transform_stamped(
             &self.options.map_frame,
             &self.options.headset_frame,
             now_ns,
-            &known.map_from_headset,
+            &current.map_from_headset,
         )
     }
 }

@@ -49,17 +49,20 @@ impl SemanticIcpServer {
             self.hold(running, update, now_ns, out);
             return;
         }
-        let before = self.known.as_ref().map(|known| known.map_from_headset);
+        let before = self
+            .current
+            .as_ref()
+            .map(|current| current.map_from_headset);
         let moved = before.is_some_and(|before| !is_near(&before, &found.map_from_headset, MOVED));
         if running.confirms {
             self.counts.confirmations += 1;
             self.counts.poses_withdrawn += u64::from(moved);
-            match &mut self.known {
+            match &mut self.current {
                 // Together they fit best elsewhere: what one of them told is not so.
-                _ if moved => self.known = None,
+                _ if moved => self.current = None,
                 // They tell no more than that each fits.
-                Some(known) if found.verdict != Verdict::Ok => {
-                    known.looks = running.headset_scans.len();
+                Some(current) if found.verdict != Verdict::Ok => {
+                    current.looks = running.headset_scans.len();
                     self.answer_found(running.caller, found.verdict, &result, out);
                     return;
                 }
@@ -78,13 +81,13 @@ impl SemanticIcpServer {
                     self.headset_scans
                         .add(Arc::clone(headset_scan), running.stamp_ns, now_ns);
                 }
-                let known = Known {
+                let current = CurrentCalibration {
                     map_from_headset: found.map_from_headset,
                     result: result.clone(),
                     looks: running.headset_scans.len(),
                 };
-                out.push(Output::Transform(self.transform(&known, now_ns)));
-                self.known = Some(known);
+                out.push(Output::Transform(self.transform(&current, now_ns)));
+                self.current = Some(current);
             }
             // These looks say nothing, and would spoil the next search.
             Verdict::RejectedInput => self.headset_scans.remove(&running.headset_scans),
@@ -120,7 +123,7 @@ impl SemanticIcpServer {
 
     fn missed(&mut self) {
         self.misses += 1;
-        if self.misses >= self.options.lost_after && self.known.take().is_some() {
+        if self.misses >= self.options.lost_after && self.current.take().is_some() {
             self.counts.tracking_lost += 1;
         }
     }
@@ -154,10 +157,10 @@ impl SemanticIcpServer {
         now_ns: i64,
         out: &mut Vec<Output>,
     ) {
-        let Some(known) = self.known.as_ref().filter(|_| !running.outdated) else {
+        let Some(current) = self.current.as_ref().filter(|_| !running.outdated) else {
             return;
         };
-        let inliers = known.result.inlier_fraction;
+        let inliers = current.result.inlier_fraction;
         let update = update.filter(|update| update.fits);
         // A mirrored cloud has the same floor: it fits somewhat.
         let in_doubt = |u: &TrackUpdate| {
@@ -183,12 +186,12 @@ impl SemanticIcpServer {
 
     /// A look fits the known pose, which it has refined.
     fn hold(&mut self, running: &Running, update: TrackUpdate, now_ns: i64, out: &mut Vec<Output>) {
-        let Some(known) = &mut self.known else {
+        let Some(current) = &mut self.current else {
             return;
         };
         self.misses = 0;
-        known.map_from_headset = update.map_from_headset;
-        let mut result = known.result.clone();
+        current.map_from_headset = update.map_from_headset;
+        let mut result = current.result.clone();
         let covariance = nalgebra::Matrix6::from_row_slice(&result.covariance);
         set_pose(&mut result, &update.map_from_headset, &covariance);
         result.inlier_fraction = update.inlier_fraction;

@@ -9,8 +9,8 @@ pub(super) struct PendingRequest {
     pub start: Option<Isometry3<f64>>,
 }
 
-/// Known pose of the headset.
-pub(super) struct Known {
+/// Current pose of the headset and the result of its search.
+pub(super) struct CurrentCalibration {
     pub map_from_headset: Isometry3<f64>,
     /// Result of the search that found it.
     pub result: CalibrationResult,
@@ -67,11 +67,11 @@ impl SemanticIcpServer {
             return;
         }
         if let Some((headset_scan, stamp_ns)) = self.look.take() {
-            if let Some(known) = &self.known {
+            if let Some(current) = &self.current {
                 self.counts.clouds_tracked += 1;
                 let work = Work::Track {
                     headset_scan,
-                    map_from_headset: known.map_from_headset,
+                    map_from_headset: current.map_from_headset,
                 };
                 self.begin(work, None, stamp_ns, now_ns, out);
                 return;
@@ -79,7 +79,7 @@ impl SemanticIcpServer {
             self.headset_scans.push(headset_scan, stamp_ns, now_ns);
             self.fresh_cloud = true;
         }
-        let due = self.fresh_cloud && self.known.is_none() && !self.headset_scans.is_empty();
+        let due = self.fresh_cloud && self.current.is_none() && !self.headset_scans.is_empty();
         if due && self.options.search == SearchWhen::Lost && self.has_map() {
             self.counts.clouds_searched += 1;
             self.search_all(PendingRequest::default(), now_ns, out);
@@ -90,7 +90,10 @@ impl SemanticIcpServer {
     /// can fit elsewhere as well.
     pub(super) fn confirm(&mut self, now_ns: i64, out: &mut Vec<Output>) {
         let looks = self.headset_scans.len();
-        let is_due = self.known.as_ref().is_some_and(|known| looks > known.looks);
+        let is_due = self
+            .current
+            .as_ref()
+            .is_some_and(|current| looks > current.looks);
         let is_free = self.running.is_none() && self.pending.is_none();
         if !is_due || !is_free || self.options.search != SearchWhen::Lost {
             return;
