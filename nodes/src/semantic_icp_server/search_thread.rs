@@ -9,9 +9,9 @@ use super::search::{Done, Job, Search};
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use lattice_runtime::{Shutdown, lock};
 
-/// News of the searching thread.
+/// Progress and results of the search thread that the server has not taken yet.
 #[derive(Default)]
-struct News {
+struct SearchEvents {
     progress: Option<(u64, Stage, f64)>,
     done: Vec<(u64, Done)>,
 }
@@ -19,13 +19,13 @@ struct News {
 /// Searches on a thread of its own, one job after another.
 pub(super) struct SearchThread {
     compute: Compute<Option<Job>>,
-    news: Arc<Mutex<News>>,
+    events: Arc<Mutex<SearchEvents>>,
 }
 
 /// Takes jobs for a [`SearchThread`], and has what became of them.
 pub(super) struct SearchPort {
     inbox: Inbox<Option<Job>>,
-    news: Arc<Mutex<News>>,
+    events: Arc<Mutex<SearchEvents>>,
 }
 
 impl SearchThread {
@@ -38,8 +38,8 @@ impl SearchThread {
         mut search: impl Search,
         wake: impl Fn() + Send + Sync + 'static,
     ) -> io::Result<Self> {
-        let news = Arc::<Mutex<News>>::default();
-        let results = Arc::clone(&news);
+        let events = Arc::<Mutex<SearchEvents>>::default();
+        let results = Arc::clone(&events);
         let limits = ComputeLimits {
             events: 2,
             bytes: 0,
@@ -58,14 +58,14 @@ impl SearchThread {
             lock(&results).done.push((id, done));
             wake();
         })?;
-        Ok(Self { compute, news })
+        Ok(Self { compute, events })
     }
 
     /// Port at which jobs are handed in.
     pub fn port(&self) -> SearchPort {
         SearchPort {
             inbox: self.compute.inbox(),
-            news: Arc::clone(&self.news),
+            events: Arc::clone(&self.events),
         }
     }
 
@@ -83,11 +83,11 @@ impl SearchPort {
 
     /// Progress of the running job, if that is news.
     pub fn take_progress(&self) -> Option<(u64, Stage, f64)> {
-        lock(&self.news).progress.take()
+        lock(&self.events).progress.take()
     }
 
     /// Jobs that have ended since the last call.
     pub fn take_done(&self) -> Vec<(u64, Done)> {
-        std::mem::take(&mut lock(&self.news).done)
+        std::mem::take(&mut lock(&self.events).done)
     }
 }
