@@ -20,11 +20,11 @@ const CHUNK_VOXELS: usize = 3000;
 
 /// Difference between the map and what clients have been sent.
 #[derive(Debug)]
-pub enum News {
+pub enum MapChange {
     /// None.
-    Nothing,
+    Unchanged,
     /// All of it: it is another map.
-    OtherMap,
+    Replaced,
     /// An update, in chunks.
     Updates(Vec<Entry>),
 }
@@ -73,18 +73,18 @@ impl MapSource {
     }
 
     /// Changes that clients do not have; nothing while the map is between two states.
-    pub fn take_news(&mut self) -> Result<News, cdr::CdrError> {
+    pub fn take_change(&mut self) -> Result<MapChange, cdr::CdrError> {
         let (Some(map), Some(sequence)) = (self.follower.map(), self.follower.sequence()) else {
-            return Ok(News::Nothing);
+            return Ok(MapChange::Unchanged);
         };
         let epoch = map.info.epoch;
         let known = self.sent.filter(|sent| sent.epoch == epoch);
         if known.is_some_and(|sent| sent.sequence == sequence) {
-            return Ok(News::Nothing);
+            return Ok(MapChange::Unchanged);
         }
         let (touched, replaced) = self.follower.take_touched();
         let Some(map) = self.follower.map() else {
-            return Ok(News::Nothing);
+            return Ok(MapChange::Unchanged);
         };
         let Some(sent) = known.filter(|_| !replaced) else {
             let history = History::default();
@@ -93,7 +93,7 @@ impl MapSource {
                 sequence,
                 history,
             });
-            return Ok(News::OtherMap);
+            return Ok(MapChange::Replaced);
         };
         let mut keys: Vec<MortonKey> = touched.into_iter().collect();
         keys.sort_unstable();
@@ -108,7 +108,7 @@ impl MapSource {
             .into_iter()
             .map(thin::both)
             .collect::<Result<_, _>>()?;
-        Ok(News::Updates(updates))
+        Ok(MapChange::Updates(updates))
     }
 
     /// A keyframe of the state that clients are at; `None` while there is none, or the map has gone on.

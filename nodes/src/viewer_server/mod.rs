@@ -37,7 +37,7 @@ pub use fixed::{serve, serve_labelled};
 pub use graph::ConnectionGraph;
 pub use http::{Decision, Head, RequestAuth};
 pub use inputs::{Input, InputCounts, InputRefusal, Inputs};
-pub use map_source::{MapSource, News};
+pub use map_source::{MapChange, MapSource};
 pub use map_stream::{Cursor, Entry, MapStream, Next};
 pub use offer::{Offer, OpenTopic};
 pub use options::{ViewerOptions, url};

@@ -13,7 +13,7 @@ use super::bridge::{HandOver, HeadsetTopics, NodeBridge};
 use super::broadcaster::Broadcaster;
 use super::counts::BroadcasterCounts;
 use super::inputs::{Input, InputCounts, Inputs, Waiting};
-use super::map_source::{MapSource, News};
+use super::map_source::{MapChange, MapSource};
 use super::map_stream::MapStream;
 use super::options::{ViewerOptions, url};
 use super::outbox::Class;
@@ -243,10 +243,10 @@ impl Shell {
 
     /// Gives clients what has changed, and a keyframe where one is wanted.
     fn feed(&mut self) {
-        match self.source.take_news() {
-            Ok(News::Nothing) => {}
-            Ok(News::OtherMap) => self.broadcaster.change_map(MapStream::reset),
-            Ok(News::Updates(updates)) => self
+        match self.source.take_change() {
+            Ok(MapChange::Unchanged) => {}
+            Ok(MapChange::Replaced) => self.broadcaster.change_map(MapStream::reset),
+            Ok(MapChange::Updates(updates)) => self
                 .broadcaster
                 .change_map(|stream| updates.into_iter().for_each(|update| stream.push(update))),
             Err(error) => log::warn!("the map was not passed on: {error}"),

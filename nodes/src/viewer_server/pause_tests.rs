@@ -77,10 +77,10 @@ impl Growing {
 
     /// As the node does at each tick.
     fn feed(&mut self) {
-        match self.source.take_news().unwrap() {
-            News::Nothing => {}
-            News::OtherMap => self.broadcaster.change_map(MapStream::reset),
-            News::Updates(updates) => self
+        match self.source.take_change().unwrap() {
+            MapChange::Unchanged => {}
+            MapChange::Replaced => self.broadcaster.change_map(MapStream::reset),
+            MapChange::Updates(updates) => self
                 .broadcaster
                 .change_map(|stream| updates.into_iter().for_each(|update| stream.push(update))),
         }

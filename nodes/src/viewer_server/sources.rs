@@ -45,7 +45,7 @@ enum When {
     /// Always: it is small, and who comes late must have it.
     Always,
     /// While somebody wants it.
-    Wanted,
+    OnDemand,
     /// The same, anew for each who comes: the publisher then sends all that there is again.
     EachAnew,
 }
@@ -136,7 +136,7 @@ impl Sources {
         )?;
         builder.add::<CalibrationResult>("calibration", shared(Qos::LATCHED), 1, When::Always)?;
         builder.add::<LabelInfo>("label_info", shared(Qos::LATCHED), 1, When::Always)?;
-        builder.add::<PointCloud2>("map_centers", dedicated(Qos::MARKERS), 1, When::Wanted)?;
+        builder.add::<PointCloud2>("map_centers", dedicated(Qos::MARKERS), 1, When::OnDemand)?;
         builder.add::<MarkerArray>(
             "voxel_markers",
             dedicated(Qos::MARKERS),
@@ -145,7 +145,7 @@ impl Sources {
         )?;
         builder.add::<LatticeMap>("free", dedicated(Qos::MAP), 1000, When::EachAnew)?;
         for topic in &options.cloud_topics {
-            builder.add::<PointCloud2>(topic, dedicated(Qos::SCANS), 20, When::Wanted)?;
+            builder.add::<PointCloud2>(topic, dedicated(Qos::SCANS), 20, When::OnDemand)?;
         }
         Ok(builder.sources)
     }
