@@ -97,7 +97,7 @@ fn any_head(head: &[u8], left: u64) -> Option<Head> {
 }
 
 /// Head of a message of a known channel, with a CDR header or that of a zstd frame.
-fn message_head<V>(head: &[u8], left: u64, known: &Known<'_, V>) -> Option<Head> {
+fn message_head<V>(head: &[u8], left: u64, bounds: &MessageBounds<'_, V>) -> Option<Head> {
     let found = any_head(head, left).filter(|found| found.opcode == op::MESSAGE)?;
     let shortest = MESSAGE_HEAD_BYTES as u64 - RECORD_HEADER_BYTES;
     let channel = u16::try_from(number(head, 9, 2)?).ok()?;
@@ -105,8 +105,8 @@ fn message_head<V>(head: &[u8], left: u64, known: &Known<'_, V>) -> Option<Head>
     let data = head.get(31..MESSAGE_HEAD_BYTES)?;
     let is_cdr = matches!(data, [0, ..=MAX_REPRESENTATION, ..]);
     let is_message = (shortest..=MAX_MESSAGE_BYTES + 22).contains(&found.len)
-        && known.channels.contains_key(&channel)
-        && (known.span.0..=known.span.1).contains(&log_time)
+        && bounds.channels.contains_key(&channel)
+        && (bounds.span.0..=bounds.span.1).contains(&log_time)
         && (is_cdr || data.starts_with(ZSTD_MAGIC));
     is_message.then_some(found)
 }
@@ -162,7 +162,7 @@ pub(super) fn messages<V>(
 ) -> io::Result<Vec<Block>> {
     let mut window = Window::new(file, end);
     let span = chunk_span(window.at(start, CHUNK_SPAN_BYTES)?);
-    let of = |span| Known { channels, span };
+    let of = |span| MessageBounds { channels, span };
     let found = runs(&mut window, start, &of(span.unwrap_or(ALL_TIMES)))?;
     match span {
         Some(_) if found.is_empty() => runs(&mut window, start, &of(ALL_TIMES)),
@@ -177,16 +177,20 @@ fn chunk_span(head: &[u8]) -> Option<(u64, u64)> {
 }
 
 /// Known channels and bounds of log time for the messages of a stretch.
-struct Known<'a, V> {
+struct MessageBounds<'a, V> {
     channels: &'a BTreeMap<u16, V>,
     /// First and last log time, ns.
     span: (u64, u64),
 }
 
-fn runs<V>(window: &mut Window<'_>, start: u64, known: &Known<'_, V>) -> io::Result<Vec<Block>> {
+fn runs<V>(
+    window: &mut Window<'_>,
+    start: u64,
+    bounds: &MessageBounds<'_, V>,
+) -> io::Result<Vec<Block>> {
     let end = window.end;
     let mut runs = Runs::default();
-    let mut next = next_message(window, start, known)?;
+    let mut next = next_message(window, start, bounds)?;
     while let Some((at, head)) = next {
         let behind = at + head.bytes();
         let follows = window.at(behind, RECORD_HEADER_BYTES as usize)?;
@@ -194,14 +198,14 @@ fn runs<V>(window: &mut Window<'_>, start: u64, known: &Known<'_, V>) -> io::Res
         // A length that is too large hides the message behind.
         let inside = match is_followed {
             true => None,
-            false => next_message(window, at + 1, known)?.filter(|(at, _)| *at < behind),
+            false => next_message(window, at + 1, bounds)?.filter(|(at, _)| *at < behind),
         };
         next = match inside {
             Some(inside) => Some(inside),
             None => {
                 let head_bytes = window.at(at, MESSAGE_HEAD_BYTES)?;
                 runs.add(at, head.bytes(), head_bytes);
-                next_message(window, behind, known)?
+                next_message(window, behind, bounds)?
             }
         };
     }
@@ -212,11 +216,11 @@ fn runs<V>(window: &mut Window<'_>, start: u64, known: &Known<'_, V>) -> io::Res
 fn next_message<V>(
     window: &mut Window<'_>,
     from: u64,
-    known: &Known<'_, V>,
+    bounds: &MessageBounds<'_, V>,
 ) -> io::Result<Option<(u64, Head)>> {
     for at in from..window.end {
         let left = window.end - at;
-        if let Some(head) = message_head(window.at(at, MESSAGE_HEAD_BYTES)?, left, known) {
+        if let Some(head) = message_head(window.at(at, MESSAGE_HEAD_BYTES)?, left, bounds) {
             return Ok(Some((at, head)));
         }
     }
