@@ -6,7 +6,7 @@
 
 pub mod node;
 mod parameters;
-mod share;
+mod robot_map;
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 pub use parameters::declare;
-pub use share::{Refusal, Share};
+pub use robot_map::{Refusal, RobotMap};
 
 use crate::convert::{geometry, map};
 use crate::map_follower::{FollowError, Followed, MapFollower};
@@ -73,7 +73,7 @@ pub struct MergerCounts {
 /// Follows the maps of several robots and keeps their sum.
 pub struct MapMerger {
     options: MergerOptions,
-    shares: Vec<Share>,
+    robot_maps: Vec<RobotMap>,
     /// None before the first robot's map is known.
     union: Option<VoxelList>,
     origin: Option<GeoPoint>,
@@ -86,9 +86,9 @@ pub struct MapMerger {
 impl MapMerger {
     /// Has heard of no robot yet; `epoch` tells this map from earlier ones on the same topic.
     pub fn new(options: MergerOptions, epoch: u64) -> Self {
-        let share = |_| Share::new(MapFollower::new(options.max_voxels));
+        let robot_map = |_| RobotMap::new(MapFollower::new(options.max_voxels));
         Self {
-            shares: (0..options.robots.len()).map(share).collect(),
+            robot_maps: (0..options.robots.len()).map(robot_map).collect(),
             options,
             union: None,
             origin: None,
@@ -102,8 +102,8 @@ impl MapMerger {
     /// Goes on with other options; robots, frame, datum and labels stay as they are.
     pub fn set_options(&mut self, options: MergerOptions) {
         let (max_voxels, chunk_bytes) = (options.max_voxels, options.chunk_bytes);
-        for share in &mut self.shares {
-            share.follower.set_max_voxels(max_voxels);
+        for robot_map in &mut self.robot_maps {
+            robot_map.follower.set_max_voxels(max_voxels);
         }
         self.options.max_voxels = max_voxels;
         self.options.chunk_bytes = chunk_bytes;
@@ -129,25 +129,25 @@ impl MapMerger {
         message: impl FnOnce(&mut MapFollower) -> Result<Followed, FollowError>,
     ) -> Result<Followed, FollowError> {
         self.counts.messages_in += 1;
-        let Some(share) = self.shares.get_mut(robot) else {
+        let Some(robot_map) = self.robot_maps.get_mut(robot) else {
             return Ok(Followed::Old);
         };
-        let followed = message(&mut share.follower);
+        let followed = message(&mut robot_map.follower);
         self.counts.messages_refused += u64::from(followed.is_err());
         followed
     }
 
     /// Waits a second more for what is incomplete; gives the robots whose keyframe is to be asked for.
     pub fn check_keyframe_timeout(&mut self) -> Vec<usize> {
-        let waiting = self.shares.iter_mut().enumerate();
-        let waiting =
-            waiting.filter_map(|(i, share)| share.follower.check_keyframe_timeout().then_some(i));
+        let waiting = self.robot_maps.iter_mut().enumerate();
+        let waiting = waiting
+            .filter_map(|(i, robot_map)| robot_map.follower.check_keyframe_timeout().then_some(i));
         waiting.collect()
     }
 
     /// The changes of all robots since the call before, as one step of the sequence.
     pub fn take_update(&mut self) -> Vec<LatticeMapUpdate> {
-        for robot in 0..self.shares.len() {
+        for robot in 0..self.robot_maps.len() {
             self.admit(robot);
         }
         self.sum_up();
@@ -181,10 +181,10 @@ impl MapMerger {
     /// Takes the lattice of a robot's map if it is the first, else holds it against the merged one.
     fn admit(&mut self, robot: usize) {
         let options = &self.options;
-        let Some(share) = self.shares.get_mut(robot) else {
+        let Some(robot_map) = self.robot_maps.get_mut(robot) else {
             return;
         };
-        let Some(followed) = share.begun() else {
+        let Some(followed) = robot_map.begun() else {
             return;
         };
         self.counts.shares_replaced += 1;
@@ -200,7 +200,7 @@ impl MapMerger {
         let Some(union) = &self.union else {
             return;
         };
-        let admitted = share.admit(union, &options.map_frame, self.origin.as_ref());
+        let admitted = robot_map.admit(union, &options.map_frame, self.origin.as_ref());
         match admitted {
             Ok(origin) => self.origin = self.origin.or(origin),
             Err(refusal) => {
@@ -216,8 +216,8 @@ impl MapMerger {
             return;
         };
         let mut cells: Vec<MortonKey> = Vec::new();
-        for share in &mut self.shares {
-            self.counts.voxels_out_of_range += share.take_changed(&mut cells);
+        for robot_map in &mut self.robot_maps {
+            self.counts.voxels_out_of_range += robot_map.take_changed(&mut cells);
         }
         cells.sort_unstable();
         cells.dedup();
@@ -225,9 +225,9 @@ impl MapMerger {
         for cell in cells {
             labels.clear();
             let mut sum = Voxel::default();
-            for (robot, share) in (0..).zip(&self.shares) {
+            for (robot, robot_map) in (0..).zip(&self.robot_maps) {
                 let robot = (self.options.labels == MergedLabels::Robots).then_some(robot);
-                share.add_to(cell, &mut sum, &mut labels, robot);
+                robot_map.add_to(cell, &mut sum, &mut labels, robot);
             }
             let labels = labels.iter().map(|(label, count)| LabelCount {
                 label: *label,
@@ -247,8 +247,8 @@ impl MapMerger {
     }
 
     /// Robots whose map is part of the merged one, in the order of the options.
-    pub fn shares(&self) -> &[Share] {
-        &self.shares
+    pub fn robot_maps(&self) -> &[RobotMap] {
+        &self.robot_maps
     }
 
     /// Counters.
@@ -257,7 +257,7 @@ impl MapMerger {
     }
 
     fn stamp(&self) -> map::MapStamp<'_> {
-        let stamps = self.shares.iter().filter_map(Share::stamp_ns);
+        let stamps = self.robot_maps.iter().filter_map(RobotMap::stamp_ns);
         let newest_ns = stamps.max().unwrap_or(0);
         map::MapStamp {
             header: geometry::header(&self.options.map_frame, newest_ns),

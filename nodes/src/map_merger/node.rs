@@ -174,10 +174,11 @@ impl Shell {
     }
 
     fn diagnose(&self) {
-        let shares = || self.robots.iter().zip(self.machine.shares());
-        let refused = shares().find_map(|(robot, share)| Some((robot, share.refusal()?)));
-        let silent: Vec<&str> = shares()
-            .filter(|(_, share)| share.voxels() == 0)
+        let robot_maps = || self.robots.iter().zip(self.machine.robot_maps());
+        let refused =
+            robot_maps().find_map(|(robot, robot_map)| Some((robot, robot_map.refusal()?)));
+        let silent: Vec<&str> = robot_maps()
+            .filter(|(_, robot_map)| robot_map.voxels() == 0)
             .map(|(robot, _)| robot.as_str())
             .collect();
         let counts = self.machine.counts();
@@ -194,8 +195,8 @@ impl Shell {
             (Level::Ok, "merging".to_owned())
         };
         let mut values = report::key_values(counts);
-        for (robot, share) in shares() {
-            values.push((format!("{robot}_voxels"), share.voxels().to_string()));
+        for (robot, robot_map) in robot_maps() {
+            values.push((format!("{robot}_voxels"), robot_map.voxels().to_string()));
         }
         let losses = self.losses().into_iter();
         values.extend(losses.map(|(key, count)| (key, count.to_string())));
@@ -230,12 +231,12 @@ impl Shell {
             self.publish();
         }
         self.output.flush();
-        let shares = self.robots.iter().zip(self.machine.shares());
+        let robot_maps = self.robots.iter().zip(self.machine.robot_maps());
         let report = MergerReport {
             counts: self.machine.counts(),
             voxels: self.voxels(),
-            robots: shares
-                .map(|(robot, share)| (robot.as_str(), share.voxels()))
+            robots: robot_maps
+                .map(|(robot, robot_map)| (robot.as_str(), robot_map.voxels()))
                 .collect(),
             losses: self.losses(),
             updates_not_published: self.output.updates_lost(),

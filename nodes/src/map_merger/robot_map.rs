@@ -35,7 +35,7 @@ pub enum Refusal {
 }
 
 /// A robot's map and its place in the merged one.
-pub struct Share {
+pub struct RobotMap {
     pub(super) follower: MapFollower,
     /// Lattice index of its datum less that of the merged map's; none if it is not part of it.
     shift: Option<[i64; 3]>,
@@ -50,7 +50,7 @@ pub struct Share {
     unit: f64,
 }
 
-impl Share {
+impl RobotMap {
     pub(super) fn new(follower: MapFollower) -> Self {
         Self {
             follower: follower.keeping_before(),
