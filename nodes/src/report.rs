@@ -7,7 +7,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::files::whole::{self, WholeFile};
+use crate::files::atomic_write::{self, AtomicFile};
 use crate::start::NodeError;
 use lattice_runtime::Diagnostics;
 use lattice_runtime::params::{ParamError, Params};
@@ -38,7 +38,7 @@ pub fn file(params: &Params) -> Result<String, ParamError> {
     if path.is_empty() {
         return Ok(path);
     }
-    match WholeFile::create(Path::new(&path)) {
+    match AtomicFile::create(Path::new(&path)) {
         Ok(_) => Ok(path),
         Err(error) => Err(params.invalid(name, format!("{path:?}: {error}"))),
     }
@@ -64,7 +64,7 @@ pub fn write(
     }
     let transport = diagnostics.losses().into_iter().collect();
     let text = serde_json::to_string_pretty(&WithLosses { report, transport })?;
-    whole::write_text(Path::new(path), &(text + "\n"))
+    atomic_write::write_text(Path::new(path), &(text + "\n"))
 }
 
 /// Reads a report that [`write()`] wrote.

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::cell_size::CellSize;
 use super::points::{Columns, Points};
 use super::{CliResult, Lattices, init_logging};
-use lattice_nodes::files::whole;
+use lattice_nodes::files::atomic_write;
 
 /// Quantize a point file
 #[derive(Args)]
@@ -89,7 +89,7 @@ impl Quantize {
                 max_distance_m: distortion.max_distance_m,
             });
             if let (0, Some(path)) = (i, &self.map_out) {
-                whole::write(path, |out| write_map(&list, out))?;
+                atomic_write::write(path, |out| write_map(&list, out))?;
             }
         }
         if self.json {

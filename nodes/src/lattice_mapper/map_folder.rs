@@ -13,7 +13,7 @@ use lattice_runtime::params::{ParamError, Params};
 use rustix::fs::{Mode, OFlags, open};
 use thiserror::Error;
 
-use crate::files::whole::WholeFile;
+use crate::files::atomic_write::AtomicFile;
 
 /// Level that costs little time.
 const ZSTD_LEVEL: i32 = 3;
@@ -108,7 +108,7 @@ impl MapFolder {
             zstd_level: Some(ZSTD_LEVEL),
             ..WriteOptions::default()
         };
-        let mut file = WholeFile::create(&path).map_err(io)?;
+        let mut file = AtomicFile::create(&path).map_err(io)?;
         let names = match contents.payload().labels {
             true => lock(&self.names).clone(),
             false => LabelNames::new(),

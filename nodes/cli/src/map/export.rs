@@ -9,10 +9,10 @@ use super::read;
 use crate::CliResult;
 #[cfg(feature = "lab")]
 use lattice_lab::render::RenderOptions;
+use lattice_nodes::files::atomic_write;
 use lattice_nodes::files::export::{
     write_centers_pcd, write_centers_ply, write_centers_xyz, write_mesh_ply, write_octree,
 };
-use lattice_nodes::files::whole;
 
 /// Options of `lattice map export`.
 #[derive(Args)]
@@ -80,12 +80,12 @@ impl Export {
         let list = map.into_list(usize::MAX);
         let out = &self.out;
         match target {
-            Target::CentersPly => whole::write(out, |out| write_centers_ply(&list, out)),
-            Target::CentersPcd => whole::write(out, |out| write_centers_pcd(&list, out)),
-            Target::CentersXyz => whole::write(out, |out| write_centers_xyz(&list, out)),
-            Target::MeshPly => whole::write(out, |out| write_mesh_ply(&list, out)),
+            Target::CentersPly => atomic_write::write(out, |out| write_centers_ply(&list, out)),
+            Target::CentersPcd => atomic_write::write(out, |out| write_centers_pcd(&list, out)),
+            Target::CentersXyz => atomic_write::write(out, |out| write_centers_xyz(&list, out)),
+            Target::MeshPly => atomic_write::write(out, |out| write_mesh_ply(&list, out)),
             Target::Octree => {
-                let tree = whole::write(out, |out| write_octree(&list, out))?;
+                let tree = atomic_write::write(out, |out| write_octree(&list, out))?;
                 let exact = match list.lattice().kind() {
                     LatticeKind::Cubic => "each cell is eight voxels, exactly",
                     _ => "those with their centre in an occupied cell (--lattice cubic is exact)",

@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::Args;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
 use lattice_core::voxels::label_names::{LabelNames, write_named};
-use lattice_nodes::files::whole;
+use lattice_nodes::files::atomic_write;
 use serde::Serialize;
 
 use crate::CliResult;
@@ -44,7 +44,7 @@ impl Form {
             zstd_level: self.zstd,
             occupancy_only: self.occupancy_only,
         };
-        let file_bytes = whole::write(out, |writer| {
+        let file_bytes = atomic_write::write(out, |writer| {
             let mut file = Counted { writer, bytes: 0 };
             write_named(map, names, &mut file, &options).map(|()| file.bytes)
         })?;

@@ -17,7 +17,7 @@ use super::{CliResult, Lattices, fleet, init_logging};
 use lattice_bag::BagReader;
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::enu_transformer::ins::InsSource;
-use lattice_nodes::files::whole;
+use lattice_nodes::files::atomic_write;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::{self, Pipeline, RunReport, Slice, TopicPlan, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
@@ -301,7 +301,7 @@ fn write_maps(path: &Path, pipeline: &Pipeline) -> CliResult {
     for mapper in pipeline.mappers() {
         let path = map_file(path, mapper.list().lattice().kind(), several);
         let map = mapper.contents();
-        whole::write(&path, |file| map.write(file, &WriteOptions::default()))?;
+        atomic_write::write(&path, |file| map.write(file, &WriteOptions::default()))?;
     }
     Ok(())
 }

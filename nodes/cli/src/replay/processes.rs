@@ -13,7 +13,7 @@ use super::{Replay, map_file};
 use crate::CliResult;
 use crate::progress::Progress;
 use lattice_bag::BagReader;
-use lattice_nodes::files::whole;
+use lattice_nodes::files::atomic_write;
 use lattice_nodes::replay::{LatticeReport, Role, RunReport, TopicPlan};
 use lattice_runtime::LoopbackDomain;
 
@@ -125,7 +125,7 @@ impl DdsReplay<'_> {
             let saved: PathBuf = scratch.join(saved_map(lattice.kind().name()));
             let mut saved = File::open(&saved).map_err(|e| format!("{}: {e}", saved.display()))?;
             let to = map_file(path, lattice.kind(), several);
-            whole::write(&to, |file| io::copy(&mut saved, file))?;
+            atomic_write::write(&to, |file| io::copy(&mut saved, file))?;
         }
         Ok(())
     }

@@ -12,8 +12,8 @@ use tempfile::{Builder, NamedTempFile, TempPath};
 /// Any error on its way to the user.
 type AnyError = Box<dyn Error + Send + Sync>;
 
-/// A file that is being written; dropped before [`WholeFile::finish`] it leaves nothing.
-pub struct WholeFile {
+/// A file that is being written; dropped before [`AtomicFile::finish`] it leaves nothing.
+pub struct AtomicFile {
     out: BufWriter<File>,
     place: Place,
 }
@@ -28,7 +28,7 @@ enum Place {
     Beside(TempPath, PathBuf),
 }
 
-impl WholeFile {
+impl AtomicFile {
     /// Begins a file for a path; a folder that is not there or not writable is noticed here.
     pub fn create(path: &Path) -> io::Result<Self> {
         let (file, place) = match fs::metadata(path) {
@@ -105,7 +105,7 @@ fn named(file: &File, folder: &Path) -> io::Result<NamedTempFile<()>> {
     Builder::new().prefix(".").make_in(folder, link)
 }
 
-impl Write for WholeFile {
+impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.out.write(bytes)
     }
@@ -115,7 +115,7 @@ impl Write for WholeFile {
     }
 }
 
-impl Seek for WholeFile {
+impl Seek for AtomicFile {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.out.seek(to)
     }
@@ -124,10 +124,10 @@ impl Seek for WholeFile {
 /// Writes a file by what fills it; errors begin with its path.
 pub fn write<T, E: Into<AnyError>>(
     path: &Path,
-    fill: impl FnOnce(&mut WholeFile) -> Result<T, E>,
+    fill: impl FnOnce(&mut AtomicFile) -> Result<T, E>,
 ) -> Result<T, AnyError> {
     let named = |error: AnyError| -> AnyError { format!("{}: {error}", path.display()).into() };
-    let mut file = WholeFile::create(path).map_err(|error| named(error.into()))?;
+    let mut file = AtomicFile::create(path).map_err(|error| named(error.into()))?;
     let filled = fill(&mut file).map_err(|error| named(error.into()))?;
     let finished = file.finish();
     finished.map_err(|error| named(error.into()))?;
