@@ -1,4 +1,4 @@
-//! The graph of other processes: endpoints that discovery finds, and the nodes that are said to have them.
+//! ROS graph of other processes: discovered endpoints and the nodes that own them.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -11,7 +11,7 @@ use super::port::EndpointId;
 use super::remote::GraphRole;
 use super::sync::lock;
 
-/// Endpoints that are remembered, at most.
+/// Limit of stored endpoints.
 const MAX_ENDPOINTS: usize = 8192;
 
 /// Longest name of a topic, service or node, bytes.
@@ -24,23 +24,23 @@ pub struct GraphEndpoint {
     pub role: GraphRole,
     /// Full name of the topic or service.
     pub name: String,
-    /// Full name of its node; its identity in hexadecimal digits where no node says that it is its own.
+    /// Full name of its node, or its GUID in hexadecimal if no node claims it.
     pub node: String,
 }
 
-/// Endpoints in other processes, by identity.
+/// Discovered endpoints by GUID.
 #[derive(Default)]
 pub(crate) struct DiscoveredGraph(Mutex<DiscoveredEndpoints>);
 
 #[derive(Default)]
 struct DiscoveredEndpoints {
     endpoints: BTreeMap<EndpointId, (GraphRole, String)>,
-    /// Full names of the nodes of endpoints.
+    /// Full node name of each endpoint.
     nodes: BTreeMap<EndpointId, String>,
 }
 
 impl DiscoveredGraph {
-    /// An endpoint has been found, or tells of itself again.
+    /// Adds or updates an endpoint.
     pub(crate) fn add(&self, id: EndpointId, role: GraphRole, name: &str, node: Option<String>) {
         let known = &mut *lock(&self.0);
         if name.len() > MAX_NAME_BYTES
@@ -54,15 +54,15 @@ impl DiscoveredGraph {
         }
     }
 
-    /// Endpoints have gone.
+    /// Removes endpoints.
     pub(crate) fn remove(&self, gone: impl Fn(&EndpointId) -> bool) {
         let mut known = lock(&self.0);
         known.endpoints.retain(|id, _| !gone(id));
         known.nodes.retain(|id, _| !gone(id));
     }
 
-    /// Takes a message of `ros_discovery_info`, whose identities have 24 bytes up to Humble and 16 since: of one
-    /// length it is none of the other. A participant speaks for its own endpoints alone.
+    /// Takes a message of `ros_discovery_info`. GIDs have 24 bytes up to Humble and 16 bytes since; the two
+    /// lengths cannot be confused. A participant's claims apply to its own endpoints only.
     pub(crate) fn on_message(&self, message: &[u8]) -> Result<(), CdrError> {
         match cdr::from_slice::<ParticipantEntitiesInfo<[u8; 16]>>(message) {
             Ok(message) => self.keep(message),
@@ -98,7 +98,7 @@ impl DiscoveredGraph {
         }
     }
 
-    /// Those that are known by now.
+    /// All known endpoints.
     pub(crate) fn all(&self) -> Vec<GraphEndpoint> {
         let known = lock(&self.0);
         let endpoint = |(id, (role, name)): (&EndpointId, &(GraphRole, String))| GraphEndpoint {

@@ -1,13 +1,13 @@
-//! A ROS 2 client library for nodes: arguments, names, parameters, topics, services, actions, time and
-//! log, over a transport behind one port.
+//! ROS 2 client library: arguments, names, parameters, topics, services, actions, time and logging, over
+//! an abstract transport.
 #![deny(unsafe_code)]
 
 mod action;
 mod arrivals;
 mod clock;
-#[expect(unsafe_code, reason = "sockets of others are borrowed")]
+#[expect(unsafe_code, reason = "borrows sockets of the transport")]
 mod confine;
-#[expect(unsafe_code, reason = "Cyclone DDS has an interface in C")]
+#[expect(unsafe_code, reason = "calls the C API of Cyclone DDS")]
 mod cyclone;
 mod diagnostics;
 mod discovered_graph;

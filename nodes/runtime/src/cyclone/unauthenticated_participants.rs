@@ -1,5 +1,5 @@
-//! Participants that security keeps out. Cyclone says nothing of those without a certificate, nor of all
-//! whose handshake fails; what they have in common is that they show none of their endpoints.
+//! Participants rejected by DDS Security. Cyclone reports neither participants without a certificate nor all
+//! failed handshakes, so rejection is inferred: a rejected participant announces no endpoint.
 
 use std::collections::BTreeMap;
 use std::ffi::{CStr, c_void};
@@ -19,19 +19,19 @@ use super::log::tell;
 use crate::port::EndpointId;
 use crate::sync::lock;
 
-/// Time for the handshake, after which who shows nothing is a stranger.
+/// Time for the handshake. A participant without endpoints after it counts as unauthenticated.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Participants that are watched, at most.
+/// Limit of tracked participants.
 const MAX_PARTICIPANTS: usize = 4096;
 
-/// Property in which Cyclone gives the addresses of a participant.
+/// Cyclone property with the addresses of a participant.
 const ADDRESSES: &CStr = c"__NetworkAddresses";
 
-/// First twelve bytes of the GUIDs of a participant and its endpoints.
+/// GUID prefix (12 bytes), common to a participant and its endpoints.
 type Prefix = [u8; 12];
 
-/// Watches who comes, and who shows endpoints.
+/// Tracks discovered participants and whether each has announced an endpoint.
 pub(super) struct UnauthenticatedParticipants {
     participants: Entity,
     ours: Option<Prefix>,
@@ -56,7 +56,7 @@ impl UnauthenticatedParticipants {
         })
     }
 
-    /// An endpoint of a participant is known, so security has let the participant in.
+    /// Marks the participant of a discovered endpoint as authenticated.
     pub(super) fn mark_authenticated(&self, endpoint: EndpointId) {
         if let Some(prefix) = prefix(endpoint) {
             note(&mut lock(&self.others), prefix, |other| {
@@ -65,11 +65,11 @@ impl UnauthenticatedParticipants {
         }
     }
 
-    /// Participants that are kept out; the log names them.
+    /// Number of unauthenticated participants; logs each.
     pub(super) fn count(&self) -> usize {
         let mut others = lock(&self.others);
         take_all(self.participants.handle(), &mut |sample, alive| {
-            // SAFETY: the reader is of participants; this one is lent during the call.
+            // SAFETY: this reader returns participants; each is valid during the call.
             let (id, addresses) = unsafe {
                 let participant = sample.cast::<dds_builtintopic_participant_t>();
                 let Some(participant) = participant.as_ref() else {
@@ -114,11 +114,11 @@ fn prefix(id: EndpointId) -> Option<Prefix> {
 
 /// # Safety
 ///
-/// The participant is one that Cyclone has lent.
+/// The participant is on loan from Cyclone.
 unsafe fn addresses(participant: &dds_builtintopic_participant_t) -> String {
     let mut text = ptr::null_mut();
-    // SAFETY: the QoS is null or lives as long as the participant; the text is a copy that ends with 0, is
-    // ours, and is freed once.
+    // SAFETY: the QoS is null or lives as long as the participant; the text is an owned NUL-terminated copy,
+    // freed once.
     unsafe {
         if participant.qos.is_null()
             || !dds_qget_prop(participant.qos, ADDRESSES.as_ptr(), &mut text)
