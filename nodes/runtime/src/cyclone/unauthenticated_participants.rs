@@ -88,7 +88,8 @@ impl UnauthenticatedParticipants {
         let out = |other: &&Other| !other.authenticated && other.since.elapsed() >= PATIENCE;
         let out = others.values().filter(out);
         out.inspect(|other| {
-            let words = "is kept out: it has no certificate or no permissions that hold here";
+            let words =
+                "is not authenticated: it has no certificate, or no permissions for this domain";
             tell(
                 Level::Warn,
                 &format!("the participant at {} {words}", other.addresses),

@@ -270,8 +270,8 @@ mod tests {
         let there = remotes(&[("/points", "sensor_msgs/msg/LaserScan")]);
         assert_eq!(
             line(("/points", CLOUD), &there, "/", SOURCE).0,
-            "no publisher on /points (sensor_msgs/msg/PointCloud2) after 3 s; no topic is there that could \
-             take its place; start the driver with this ROS_DOMAIN_ID, or set points_topics; /points is \
+            "no publisher on /points (sensor_msgs/msg/PointCloud2) after 3 s; there is no alternative \
+             topic; start the driver with this ROS_DOMAIN_ID, or set points_topics; /points is \
              published as sensor_msgs/msg/LaserScan"
         );
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Given, Origin, ParamValue, Params, Range, State};
 use crate::sync::lock;
 
-/// Longest value that is taken, in characters or items.
+/// Longest accepted value, characters or items.
 const MAX_VALUE_LENGTH: usize = 1 << 16;
 
 /// Takes all parameters as they would be, or says why not; nothing changes then.
@@ -112,7 +112,7 @@ impl Params {
             return Ok(());
         }
         if !changes.is_open {
-            let reason = "the node is not at work yet, or no more";
+            let reason = "the node is not running";
             return Err(Refusal::Other(reason.to_owned()));
         }
         let candidate = self.candidate(&values);
@@ -133,10 +133,10 @@ impl Params {
         Ok(())
     }
 
-    /// All parameters as they would be, not declared yet.
+    /// All parameters with candidate values, not declared yet.
     fn candidate(&self, values: &Values) -> Params {
         let mut state = lock(&self.state).clone();
-        // As they were read: nothing is to be converted again.
+        // Values as parsed: they need no further conversion.
         for (name, given) in &mut state.given {
             if let Some(declared) = state.declared.get(name) {
                 given.value = declared.value.clone();
@@ -156,7 +156,7 @@ impl Params {
 }
 
 impl Given {
-    /// A value that was set at run time.
+    /// Value set at run time.
     fn set(value: ParamValue) -> Self {
         Self {
             value,
@@ -175,8 +175,8 @@ impl Changes {
 }
 
 impl State {
-    /// The values to be set, if each by itself may be; in the order of rclcpp's checks. A fixed parameter
-    /// may be given the value that it has.
+    /// Checks each value, in the order of rclcpp's checks; returns the values to set. A read-only parameter
+    /// accepts its current value.
     fn check(&self, wanted: Vec<(String, Option<ParamValue>)>) -> Result<Values, Refusal> {
         let refuse = |reason: String| Err(Refusal::Other(reason));
         if wanted.is_empty() {
@@ -189,7 +189,7 @@ impl State {
             };
             let value = value.map(|value| of_yaml(value, &declared.value));
             match declared.fixed() {
-                // `ros2 param load` sets all that `ros2 param dump` has written.
+                // `ros2 param load` sets everything that `ros2 param dump` has written.
                 Some(_) if value.as_ref() == Some(&declared.value) => {}
                 Some(why) => {
                     return refuse(format!(
@@ -230,9 +230,9 @@ impl State {
     }
 }
 
-/// A value that a tool has read from YAML, by the value that is set now.
+/// Converts a value that a tool has parsed from YAML to the type of the current value.
 ///
-/// `ros2 param load` reads each value twice: an empty list has no type, the text `off` becomes a bool, and the
+/// `ros2 param load` parses each value twice: an empty list has no type, the text `off` becomes a bool, and the
 /// number `1e-06` a text.
 fn of_yaml(value: ParamValue, now: &ParamValue) -> ParamValue {
     let is_same = match (now, &value) {
@@ -251,7 +251,7 @@ fn of_yaml(value: ParamValue, now: &ParamValue) -> ParamValue {
     }
 }
 
-/// Kind of the range that the value is not in.
+/// Kind of the violated range.
 fn outside(range: Option<Range>, value: &ParamValue) -> Option<&'static str> {
     match (range, value) {
         (Some(Range::Integer(least, most)), ParamValue::I64(value)) => {

@@ -1,4 +1,4 @@
-//! The task of a server: takes requests, and sends each answer when its client can hear it.
+//! Server task: takes requests, and sends each reply once the client's reader is matched.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering::Relaxed;
@@ -22,33 +22,33 @@ use crate::port::{EndpointId, Origin, SampleReader, ServiceForm};
 use crate::qos::Qos;
 use crate::sync::lock;
 
-/// A client may ask before its reply reader is known here; a reply sent then would be lost. Fast DDS repairs a lost
-/// announcement after 3 s.
+/// Longest wait for the reply reader of a client: a reply sent before its match would be lost. Fast DDS
+/// repairs a lost announcement after 3 s.
 const WAIT_FOR_CLIENT: Duration = Duration::from_secs(5);
 
-/// Clients of which it is remembered that no reply reader came.
+/// Limit of stored clients whose reply reader never matched.
 const MAX_ABSENT: usize = 4096;
 
-/// A server at work.
+/// A running server.
 pub(crate) struct Serving {
     pub form: ServiceForm,
     pub unanswered: Arc<Unanswered>,
     pub requests: Box<dyn SampleReader>,
-    /// Those of this process.
+    /// Requests of this process.
     pub local: Receiver<LocalCall>,
     pub replies: Arc<Outbox>,
-    /// The other ends of the replies.
+    /// Peers of the reply writer.
     pub readers: Arc<Peers>,
-    /// Clients whose reply reader did not come in time. Their further requests do not wait for it, nor others
-    /// behind them.
+    /// Clients whose reply reader did not match in time. Their further requests do not wait, nor delay
+    /// others.
     pub absent: Mutex<BTreeSet<EndpointId>>,
     pub ending: Receiver<Sender<()>>,
-    /// Requests that wait for their answers at a time, at most.
+    /// Limit of requests in progress.
     pub max_pending: usize,
     pub warning: Throttle,
 }
 
-/// A request that waits for its answer.
+/// A request in progress.
 struct Asked<R> {
     answered: Receiver<R>,
     client: Asker,
@@ -69,7 +69,7 @@ enum Step {
 }
 
 impl Serving {
-    /// Serves until the task is dropped or the end is asked for and everything answered.
+    /// Serves until the task is dropped, or until shutdown with all requests replied to.
     pub(crate) async fn run<S: RosService>(
         self,
         mut handler: impl FnMut(S::Request, Reply<S::Response>),
@@ -133,13 +133,13 @@ impl Serving {
         }
     }
 
-    /// Counts the requests that were lost since the last one.
+    /// Counts requests lost since the last one.
     fn count_lost(&self) {
         let lost = self.requests.losses().overrun.swap(0, Relaxed);
         if lost > 0 {
             self.unanswered.lost.fetch_add(lost, Relaxed);
             self.warn(&format!(
-                "{lost} requests lost: more than {} waited; ask again",
+                "{lost} requests lost: more than {} were queued; retry",
                 Qos::REQUESTS.depth
             ));
         }
@@ -169,12 +169,12 @@ impl Serving {
 
     async fn answer<R: RosMessage>(&self, asked: Asked<R>) -> Result<(), String> {
         let answer = asked.answered.recv().await;
-        let reply = answer.map_err(|_| "nobody answered it".to_owned());
+        let reply = answer.map_err(|_| "no reply was sent".to_owned());
         let (reply_to, id) = match asked.client {
             Asker::Remote { reply_to, id } => (reply_to, id),
             Asker::Local(to) => {
                 let written = |reply| cdr::to_vec(&reply).map_err(|e| e.to_string());
-                // It may wait no longer.
+                // The caller may have stopped waiting.
                 let _ = to.try_send(reply.and_then(written));
                 return Ok(());
             }
@@ -213,7 +213,7 @@ impl Serving {
     }
 }
 
-/// Gives a call of this process to the handler; one that is no request is answered at once.
+/// Passes a local call to the handler; a malformed request is rejected at once.
 fn ask_locally<S: RosService>(
     call: LocalCall,
     handler: &mut impl FnMut(S::Request, Reply<S::Response>),

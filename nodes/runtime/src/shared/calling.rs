@@ -1,4 +1,4 @@
-//! Clients of services, in this process or another.
+//! Service clients, for servers in this process or another.
 
 use std::sync::atomic::AtomicI64;
 use std::sync::{Arc, Mutex, Weak};
@@ -20,31 +20,31 @@ use crate::qos::Qos;
 use crate::service::{Asking, LocalCall, Waiting};
 use crate::sync::lock;
 
-/// Answers are longer than requests.
+/// QoS of clients: replies are longer than requests.
 const QOS: ServiceQos = ServiceQos {
     reader: Qos::SERVICES,
     writer: Qos::SERVICES,
     max_bytes: 4 << 20,
 };
 
-/// Reason why a call has no answer.
+/// Reason for a call without reply.
 #[derive(Debug, Error)]
 pub enum CallError {
-    /// No server is known.
-    #[error("nobody serves {name}")]
+    /// No server is discovered.
+    #[error("no server of {name}")]
     NoServer {
         /// Full name of the service.
         name: String,
     },
-    /// The server does not answer.
-    #[error("{name} has not answered within {patience_s} s")]
+    /// The server did not reply in time.
+    #[error("{name} has not replied within {patience_s} s")]
     Late {
         /// Full name of the service.
         name: String,
-        /// Time given, s.
+        /// Timeout, s.
         patience_s: f64,
     },
-    /// It was refused, or not sent.
+    /// The call was rejected, or not sent.
     #[error("{name}: {reason}")]
     Failed {
         /// Full name of the service.
@@ -54,7 +54,7 @@ pub enum CallError {
     },
 }
 
-/// A client of a service. Clones are the same client.
+/// A service client. Clones share the client.
 #[derive(Clone)]
 pub struct Client(Arc<Inner>);
 
@@ -81,8 +81,8 @@ impl Client {
         &self.0.name
     }
 
-    /// Asks with little-endian CDR, encapsulation header first; the answer is CDR too. A call that is
-    /// dropped is over.
+    /// Calls with little-endian CDR, encapsulation header first; the reply is CDR too. Dropping the future
+    /// cancels the call.
     pub fn call(
         &self,
         request: Vec<u8>,
@@ -105,8 +105,11 @@ impl Inner {
             Some(server) => {
                 let (answered, answer) = bounded(1);
                 match server.try_send(LocalCall { request, answered }) {
-                    Ok(()) => answer.recv().await.unwrap_or(Err("it has ended".into())),
-                    Err(_) => Err("busy, ask again".to_owned()),
+                    Ok(()) => answer
+                        .recv()
+                        .await
+                        .unwrap_or(Err("the server has ended".into())),
+                    Err(_) => Err("the server is busy; retry".to_owned()),
                 }
             }
             None => match self.remote() {
@@ -120,7 +123,7 @@ impl Inner {
         })
     }
 
-    /// The server in this process. Endpoints of ours would be in its way.
+    /// Server in this process. It needs no DDS endpoints.
     fn local(&self) -> Option<smol::channel::Sender<LocalCall>> {
         let shared = self.shared.upgrade()?;
         let server = shared.services.find(&self.name, self.service)?;
@@ -153,7 +156,7 @@ impl Inner {
 }
 
 impl Shared {
-    /// A client of `S` under a full name.
+    /// Creates a client of `S` under a full name.
     pub(crate) fn client<S: RosService>(self: &Arc<Self>, node: NodeId, name: String) -> Client {
         Client(Arc::new(Inner {
             shared: Arc::downgrade(self),

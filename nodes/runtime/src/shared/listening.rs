@@ -1,4 +1,4 @@
-//! The graph of all nodes, of which other participants publish their parts.
+//! Graph of all nodes, from the messages of other participants.
 
 use std::sync::Arc;
 
@@ -9,8 +9,8 @@ use crate::port::{GRAPH_TOPIC, SampleReader};
 use crate::sync::lock;
 
 impl Shared {
-    /// Publishers, subscriptions and servers that are known by now, of all processes. The first call begins
-    /// to listen for the names of nodes elsewhere.
+    /// Known publishers, subscriptions and servers of all processes. The first call subscribes to the node lists
+    /// of other processes.
     pub(crate) fn graph_of_all(self: &Arc<Self>) -> Vec<GraphEndpoint> {
         if let Some(open) = lock(&self.open).as_mut()
             && open.graph_of_others.is_none()
@@ -19,7 +19,7 @@ impl Shared {
                 None => None,
                 Some(Ok(reader)) => self.io.spawn(listen(reader, Arc::clone(&self.endpoints))),
                 Some(Err(error)) => {
-                    log::warn!("nodes elsewhere have no names: {error}");
+                    log::warn!("node names of other processes are unavailable: {error}");
                     None
                 }
             };

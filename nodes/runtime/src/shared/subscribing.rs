@@ -22,14 +22,14 @@ use crate::subscription::{
 };
 use crate::sync::lock;
 
-/// Small messages of a publisher in this process that wait for a subscription, at least. They are
-/// shared, not copied, and the handler that they wait for returns at once.
+/// Queue length for small messages of publishers in this process. Messages are
+/// shared, not copied, and their handler returns at once.
 const LOCAL_SMALL_MESSAGES: usize = 1024;
 
-/// The same for large ones: several bursts of line scans, and not too much of 4 MB clouds.
+/// Queue length for large messages: several bursts of line scans, and a bounded number of 4 MB clouds.
 const LOCAL_LARGE_MESSAGES: usize = 128;
 
-/// Way of a subscription to the messages of its own process.
+/// Function that joins a subscription to the local bus.
 type Join = fn(
     &Arc<Topic>,
     &Arc<Peers>,
@@ -64,7 +64,7 @@ impl Shared {
         )
     }
 
-    /// The same of any type, as CDR bytes. What this process publishes is not heard.
+    /// Subscribes to any type, as CDR bytes, without messages of this process.
     pub(crate) fn subscribe_raw(
         self: &Arc<Self>,
         node: NodeId,

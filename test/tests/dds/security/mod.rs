@@ -91,7 +91,9 @@ fn permitted_peers_hear_each_other_and_nobody_else() {
     let before = expected.map(|(peer, word)| peer.count(word));
     let kept_out = || {
         let log = lock(&friend.log);
-        let lines = log.iter().filter(|line| line.contains("is kept out"));
+        let lines = log
+            .iter()
+            .filter(|line| line.contains("is not authenticated"));
         lines.cloned().collect::<Vec<_>>()
     };
     let mut more = 0;
@@ -152,10 +154,7 @@ fn what_cannot_be_secured_is_refused_with_its_reason() {
         ("/expired", "expired"),
         ("/unsigned", "PKCS7"),
         ("/revoked", "certificate revoked"),
-        (
-            "/locked",
-            "locked/key.pem, which security needs, cannot be read",
-        ),
+        ("/locked", "locked/key.pem cannot be read"),
         ("/missing", "missing/identity_ca.cert.pem"),
     ] {
         let error = runtime(&domain, "talk", enclave, Some(ours.enforced()))
