@@ -117,14 +117,18 @@ mod tests {
     fn other_types_and_hashes_are_refused() {
         let long = "x".repeat(1 << 20);
         for (name, hash, reason) in [
-            ("std_msgs/msg/None", "", "no type that this program knows"),
+            (
+                "std_msgs/msg/None",
+                "",
+                "unknown type \"std_msgs/msg/None\"",
+            ),
             (
                 "std_msgs/msg/Empty",
                 "RIHS01_00",
-                "known here as RIHS01_20b6",
+                "has the hash RIHS01_20b6",
             ),
-            ("std_msgs/msg/Empty", "", "known here as"),
-            (&long, &long, "no type"),
+            ("std_msgs/msg/Empty", "", "has the hash"),
+            (&long, &long, "unknown type"),
         ] {
             let answer = ask(name, hash);
             assert!(!answer.successful && answer.failure_reason.len() < 500);

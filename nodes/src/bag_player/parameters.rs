@@ -1,4 +1,4 @@
-//! All parameters of the player.
+//! Parameters of the player.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -29,7 +29,7 @@ const ABOUT: &[About] = about! {
 
 const START: &str = "the log is opened with it";
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub bag: String,
     pub player: PlayerOptions,
@@ -65,7 +65,7 @@ impl Settings {
     }
 }
 
-/// Times in a log that the player takes, seconds.
+/// Allowed times in a log, seconds.
 const SECONDS: RangeInclusive<f64> = 0.0..=1e9;
 
 fn player_options(params: &Params) -> Result<PlayerOptions, ParamError> {
@@ -83,13 +83,13 @@ fn player_options(params: &Params) -> Result<PlayerOptions, ParamError> {
     })
 }
 
-/// A time of up to a day.
+/// Reads a duration of up to a day.
 fn seconds(params: &Params, name: &str, default: f64) -> Result<Duration, ParamError> {
     let seconds = params.f64_in(name, default, 0.0..=86_400.0)?;
     Ok(Duration::from_secs_f64(seconds))
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

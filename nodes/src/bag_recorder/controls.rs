@@ -1,4 +1,4 @@
-//! The services of rosbag2's recorder.
+//! Services of rosbag2's recorder.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -46,7 +46,7 @@ pub(super) fn serve(session: &Session) -> Result<Vec<Server>, RuntimeError> {
             cache.push(Item::Split);
             SplitBagfileResponse::default()
         })?,
-        // There is no mode of snapshots.
+        // Snapshot mode is not supported.
         node.service::<Snapshot>("~/snapshot", |_| SnapshotResponse { success: false })?,
     ])
 }

@@ -1,4 +1,4 @@
-//! Point files, labelled clouds, meshes and class names in, pictures and meshes of maps out.
+//! Input of point files, labelled clouds, meshes and class names; export of images and meshes of maps.
 
 pub mod atomic_write;
 pub mod classes;

@@ -137,7 +137,7 @@ fn a_cyclone_peer_describes_dumps_edits_and_loads_parameters() {
         types[1][1]
             .as_str()
             .unwrap()
-            .contains("known here as RIHS01_9198"),
+            .contains("has the hash RIHS01_9198"),
         "{types}"
     );
     assert_eq!(types[2][0], false);
