@@ -1,4 +1,4 @@
-//! The transformer as a ROS node: a thin shell around [`EnuTransformer`].
+//! ROS node around [`EnuTransformer`].
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -108,7 +108,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     losses.watch(inputs.iter().chain(&clouds));
     let ticks = inbox.clone();
     let ticks = runtime.timer(Duration::from_millis(200), move || {
-        // A full inbox is busy enough to look at its queue anyway.
+        // A full inbox checks its queue anyway.
         let _ = ticks.send(Event::Tick, 0);
     });
     log::info!("{taken}");
@@ -123,7 +123,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// The inbox for poses and transforms, with the count of those that found it full.
+/// Inbox for poses and transforms, with the count of rejected ones.
 struct PoseInbox {
     inbox: Inbox<Event>,
     lost: Arc<AtomicU64>,
@@ -162,14 +162,14 @@ impl PoseInbox {
         qos: Qos,
         event: fn(Arc<M>) -> Event,
     ) -> Result<Subscription, NodeError> {
-        // Poses count no bytes: clouds must not keep them out.
+        // Poses count no bytes: clouds must not displace them.
         let (inbox, lost) = (self.inbox.clone(), Arc::clone(&self.lost));
         let warnings = Throttle::new(Duration::from_secs(5));
         let handler = move |message: Arc<M>| {
             if !inbox.send(event(message), 0) {
                 let all = lost.fetch_add(1, Ordering::Relaxed) + 1;
                 if warnings.check().is_some() {
-                    log::warn!("the inbox is full: {all} poses and transforms are lost so far");
+                    log::warn!("the inbox is full: {all} poses and transforms lost so far");
                 }
             }
         };
@@ -177,7 +177,7 @@ impl PoseInbox {
     }
 }
 
-/// The topics that the node speaks on.
+/// Publishers of the node.
 struct Outputs {
     points: Publisher<PointCloud2>,
     tf: TfBroadcaster,
@@ -196,7 +196,7 @@ impl Outputs {
     }
 }
 
-/// Topics of the INS, for the texts of refusals.
+/// Topics of the INS, for rejection texts.
 struct InsTopics {
     ins: String,
     imu: String,
@@ -208,12 +208,12 @@ struct Shell {
     outputs: Outputs,
     clock: Clock,
     diagnostics: Diagnostics,
-    /// Clouds that found the inbox full.
+    /// Clouds rejected by a full inbox.
     lost: Arc<AtomicU64>,
-    /// Losses before it: of clouds, and of all inputs.
+    /// Losses before the inbox: of clouds, and of all inputs.
     lost_clouds: Losses,
     losses: Losses,
-    /// Poses and transforms that found the inbox full.
+    /// Poses and transforms rejected by a full inbox.
     lost_poses: Arc<AtomicU64>,
     topics: InsTopics,
     report_file: String,

@@ -1,4 +1,4 @@
-//! All parameters of the transformer.
+//! Parameters of the transformer.
 
 use super::TransformerOptions;
 use super::ins::InsSource;
@@ -52,7 +52,7 @@ const ABOUT: &[About] = about! {
 
 const POSES: &str = "poses are read and kept with it";
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub transformer: TransformerOptions,
     pub limits: ComputeLimits,
@@ -88,7 +88,7 @@ impl Settings {
 }
 
 impl Settings {
-    /// Topics and frames, for the log.
+    /// Topics and frames in use, for the log.
     pub(super) fn taken(&self) -> String {
         let options = &self.transformer;
         let (ins, imu) = (&self.ins_topic, &self.imu_topic);
@@ -107,7 +107,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

@@ -1,4 +1,4 @@
-//! Clouds of what a headset sees of its mesh.
+//! Clouds from ray casting against the headset's mesh.
 
 use lattice_core::pose::Axes;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
@@ -7,41 +7,41 @@ use super::counts::LookCounts;
 use crate::camera::{Classes, LabelledPoints, Pixel, PixelReader, PointLayout};
 use crate::mesh::{LabelledMesh, MeshError, MeshScene};
 
-/// Fewest hits by which a mesh is said to be inside out.
+/// Fewest hits for the winding check.
 const MIN_HITS: u64 = 20;
 
-/// Choice of the pixels that become points.
+/// Selection of the pixels that become points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LookOptions {
-    /// Every so many columns and rows.
+    /// Step between columns and between rows.
     pub stride: usize,
-    /// Hits nearer to the camera are none, m.
+    /// Nearer hits are ignored, m.
     pub min_range_m: f64,
-    /// Hits farther from the camera are none, m.
+    /// Farther hits are ignored, m.
     pub max_range_m: f64,
-    /// True if images are refused that see most of the mesh from behind.
+    /// True to reject images that see most of the mesh from behind.
     pub check_winding: bool,
 }
 
-/// A mesh in headset_origin, sorted for ray casting.
+/// Mesh in headset_origin, indexed for ray casting.
 pub(super) struct Room {
     mesh: LabelledMesh,
     scene: MeshScene,
 }
 
-/// An image of labels with what its pixels see.
+/// Label image with the rays of its pixels.
 pub(super) struct Look<'a> {
-    /// Labels and what came with them, read at the pixels of the camera.
+    /// Labels and companion images, sampled at the pixels of the camera.
     pub pixels: PixelReader<'a>,
-    /// x / z and y / z of each pixel of the camera; NaN: none.
+    /// x / z and y / z of each camera pixel; NaN: no ray.
     pub rays: &'a [[f32; 2]],
-    /// Pixels in a row of the camera.
+    /// Camera columns.
     pub width: usize,
-    /// Place of the camera and its turn from optical axes, both in headset_origin and the axes of ROS.
+    /// Camera position and rotation from optical axes, in headset_origin and the axes of ROS.
     pub camera: (Point3<f64>, Matrix3<f64>),
 }
 
-/// `ros_from_optical` of a camera: its pose is in the axes of the headset, its own axes are given.
+/// `ros_from_optical` of a camera, from its pose in the axes of the headset and its own axes.
 pub(super) fn placed(
     origin_from_camera: &Isometry3<f64>,
     headset: Axes,
@@ -49,20 +49,20 @@ pub(super) fn placed(
 ) -> (Point3<f64>, Matrix3<f64>) {
     let place = headset.to_ros(origin_from_camera.translation.vector);
     let turn = origin_from_camera.rotation.to_rotation_matrix();
-    // Each of these matrices is orthonormal: its transpose is the way back.
+    // Each of these matrices is orthonormal: its transpose is its inverse.
     let camera_from_optical = camera.matrix().transpose() * Axes::Optical.matrix();
     let ros_from_optical = headset.matrix() * turn.matrix() * camera_from_optical;
     (place.into(), ros_from_optical)
 }
 
 impl Room {
-    /// Sorts a mesh.
+    /// Indexes a mesh.
     pub fn new(mesh: LabelledMesh) -> Result<Self, MeshError> {
         let scene = MeshScene::new_fast(&mesh)?;
         Ok(Self { mesh, scene })
     }
 
-    /// The points that the pixels see, or how many of how many were seen from behind.
+    /// Points seen by the pixels, or the numbers of hits from behind and of all hits.
     pub fn see(
         &self,
         look: &mut Look,
@@ -117,7 +117,7 @@ impl Room {
         Ok(points)
     }
 
-    /// Points all over the mesh, one for so much of it, with the class of its triangles.
+    /// Points sampled uniformly over the mesh, labelled by its triangles.
     pub fn sampled(
         &self,
         spacing_m: f64,
@@ -140,7 +140,7 @@ impl Room {
             while saved_m2 >= each_m2 && points.len() < max_points {
                 saved_m2 -= each_m2;
                 number = number.wrapping_add(1);
-                // Two irrational steps fill a square evenly; half of it is folded onto the other.
+                // Two irrational steps fill a square uniformly; one half is folded onto the other.
                 let step = |part: f64| (f64::from(number) * part).fract();
                 let (mut u, mut v) = (step(0.754_877_666_246_693), step(0.569_840_290_998_053));
                 if u + v > 1.0 {
@@ -156,7 +156,7 @@ impl Room {
         points
     }
 
-    /// True if a ray meets a triangle from where its corners go clockwise.
+    /// True if a ray hits the clockwise side of a triangle.
     fn is_behind(&self, triangle: usize, direction: &Vector3<f64>) -> bool {
         let corners = self.mesh.triangles().get(triangle);
         let vertex = |v: u32| self.mesh.vertices_m().get(v as usize).copied();

@@ -1,4 +1,4 @@
-//! Meshes and sessions as they come.
+//! Handling of meshes and sessions.
 
 use std::sync::Arc;
 
@@ -12,11 +12,11 @@ use super::surfaces::Change;
 use super::{HeadsetCloud, HeadsetOutput};
 use crate::mesh::LabelledMesh;
 
-/// Name of the surface that a file is.
+/// Surface name of the mesh file.
 const FILE: &str = "file";
 
 impl HeadsetCloud {
-    /// Takes a surface, a chunk of it, or word that it is gone.
+    /// Handles a surface, a chunk of it, or its removal.
     pub fn on_mesh(&mut self, message: &Arc<HeadsetMesh>) -> Vec<HeadsetOutput> {
         self.counts.meshes_in += 1;
         let mut outputs = Vec::new();
@@ -28,7 +28,7 @@ impl HeadsetCloud {
         outputs
     }
 
-    /// Takes a marker of triangles as a surface of the session that holds.
+    /// Handles a marker of triangles as a surface of the current session.
     pub fn on_marker(&mut self, marker: &Marker) -> Vec<HeadsetOutput> {
         match from_marker(marker) {
             FromMarker::Surface(surface) => return self.on_mesh(&Arc::new(surface)),
@@ -46,14 +46,14 @@ impl HeadsetCloud {
         Vec::new()
     }
 
-    /// Takes a mesh that is there from the start, in the frame and axes of the headset.
+    /// Adds the mesh file, in the frame and axes of the headset.
     pub fn on_mesh_file(&mut self, mesh: &LabelledMesh) -> Result<(), MeshRefusal> {
         let change = self.surfaces.on_file(FILE, mesh)?;
         self.changed(change, 0);
         Ok(())
     }
 
-    /// Takes the session of the headset: another one than before means another origin.
+    /// Handles the session of the headset: a new session has a new origin.
     pub fn on_session(&mut self, text: &str) {
         match self.session.on_topic(text, self.now_ns) {
             Told::Same | Told::First => {}
@@ -84,7 +84,7 @@ impl HeadsetCloud {
         self.surfaces.on_mesh(message, self.now_ns)
     }
 
-    /// Forgets what was known in the origin before.
+    /// Drops everything in the previous origin.
     fn begin_session(&mut self) {
         self.counts.sessions += 1;
         self.surfaces.clear();

@@ -1,4 +1,4 @@
-//! The machine as a ROS node: a thin shell around [`HeadsetCloud`].
+//! ROS node around [`HeadsetCloud`].
 
 use std::path::Path;
 use std::sync::Arc;
@@ -39,7 +39,7 @@ enum Event {
     LabelInfo(Arc<LabelInfo>),
     Pose(Arc<PoseStamped>),
     Transforms(Arc<TFMessage>, bool),
-    /// Of the network inside of the node.
+    /// Event of the built-in network.
     Network(NetworkEvent),
     Tick,
     Settings(Box<HeadsetOptions>),
@@ -232,13 +232,13 @@ struct Shell {
     session: Publisher<std_msgs::String>,
     network: Option<NetworkView>,
     diagnostics: Diagnostics,
-    /// Messages that found the inbox full, and those lost before it.
+    /// Messages rejected by the inbox or lost before it.
     lost: Arc<AtomicU64>,
     losses: Losses,
     warnings: Throttle,
-    /// Start of the node.
+    /// Start time of the node.
     begin: Instant,
-    /// Messages dropped when there was a warning last.
+    /// Dropped messages at the last warning.
     warned: u64,
     report_file: String,
 }
@@ -261,7 +261,7 @@ impl Shell {
             Event::Pose(pose) => machine.on_pose(&pose),
             Event::Transforms(message, is_static) => machine.on_tf(&message, is_static),
             Event::Network(NetworkEvent::Labelled(labels)) => machine.on_labelled(labels),
-            // Poses are kept for longer than an image takes.
+            // Poses are kept longer than the processing of an image.
             Event::Network(NetworkEvent::Begun(_)) => return,
             Event::Network(NetworkEvent::Names) => {
                 self.tell_names();
@@ -283,7 +283,7 @@ impl Shell {
         self.publish(outputs);
     }
 
-    /// Names of the classes of the network inside of the node.
+    /// Publishes the class names of the built-in network.
     fn tell_names(&mut self) {
         let info = self.network.as_ref().and_then(NetworkView::label_info);
         if let Some(info) = info {
@@ -343,7 +343,7 @@ impl Shell {
             && self.warnings.check().is_some()
         {
             self.warned = dropped;
-            log::warn!("{message}; last refused: {problem}");
+            log::warn!("{message}; last rejection: {problem}");
         }
         let [images, chunked] = self.machine.waiting();
         let mut values = report::key_values(&report);

@@ -1,4 +1,4 @@
-//! All parameters of the node.
+//! Parameters of the node.
 
 use super::{HeadsetOptions, LabelsFrom};
 use crate::compute::ComputeLimits;
@@ -31,10 +31,10 @@ const ABOUT: &[About] = about! {
     "group_labels": "Classes that count as others: class, group, class, group and so on.";
 };
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub headset: HeadsetOptions,
-    /// Network inside of the node, with its options.
+    /// Built-in network with its options.
     pub network: Option<(NetworkSettings, SegmenterOptions)>,
     pub compressed_color: bool,
     pub mesh_file: String,
@@ -55,10 +55,10 @@ impl Settings {
         let network = NetworkSettings::from_params(params)?;
         if network.is_some() {
             if headset.labels_from == LabelsFrom::Mesh {
-                let problem = "`labels_from: mesh` takes no labels of images";
+                let problem = "`labels_from: mesh` does not use label images";
                 return Err(params.invalid("model", problem));
             }
-            // They come with the labels.
+            // They are delivered with the labels.
             headset.use_confidence = false;
         }
         Ok(Self {
@@ -76,7 +76,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

@@ -1,44 +1,44 @@
-//! The session of a headset, as its topic and its meshes tell.
+//! Headset session, from its topic and its meshes.
 
 use std::collections::VecDeque;
 
 /// Longest text of a session, bytes.
 const MAX_TEXT: usize = 256;
 
-/// Meaning of the session that a message names.
+/// Effect of a session in a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Told {
-    /// The one that is known, or none.
+    /// The current session, or none.
     Same,
-    /// The first that is told.
+    /// The first session.
     First,
-    /// Another one: the origin is elsewhere.
+    /// A new session with another origin.
     Another,
-    /// One that has ended, or no text that is kept.
+    /// An ended session, or an oversized text.
     Ended,
 }
 
-/// Longest delay of a message on its way from a headset.
+/// Longest message delay from a headset.
 pub(super) const MAX_DELAY_NS: i64 = 10_000_000_000;
-/// Silence after which a session that had ended may go on, as of an application that was in the background.
+/// Silence after which an ended session may resume, such as that of an application in the background.
 const SILENT_NS: i64 = MAX_DELAY_NS;
-/// Ended sessions that are known.
+/// Number of ended sessions stored.
 const MAX_ENDED: usize = 16;
 
-/// The session that holds and those that have ended, told apart by their texts and by the time of arrival: the
+/// Current and ended sessions, distinguished by text and arrival time: the
 /// clock of a headset may be set.
 #[derive(Default)]
 pub(super) struct Session {
     now: Option<String>,
-    /// The newest last.
+    /// Ended sessions, the newest last.
     ended: VecDeque<String>,
-    /// Arrival of the newest mesh of the session that holds, ns of the node's clock.
+    /// Arrival of the newest mesh of the current session, ns of the node's clock.
     heard_ns: i64,
 }
 
 impl Session {
-    /// Takes the session from its own topic. One that has ended does not come back: what the node itself has
-    /// published is heard late.
+    /// Handles the session topic. An ended session does not resume: the node receives its own
+    /// messages with a delay.
     pub fn on_topic(&mut self, text: &str, now_ns: i64) -> Told {
         if text.len() > MAX_TEXT {
             return Told::Ended;
@@ -50,7 +50,7 @@ impl Session {
         }
     }
 
-    /// Takes the session of a mesh: one that has ended comes back only when the other has been silent.
+    /// Handles the session of a mesh: an ended one resumes only after a silence of the current one.
     pub fn on_mesh(&mut self, text: &str, now_ns: i64) -> Told {
         if text.len() > MAX_TEXT {
             return Told::Ended;

@@ -1,7 +1,7 @@
-//! Maps of several robots as one.
+//! Merging of maps of several robots.
 //!
-//! Each voxel is the sum of what the robots' maps say of its cell, in integers, so that the order in which
-//! their messages come does not matter. Of each robot the merger knows what `map` tells: counts, mean offsets
+//! Each voxel is the integer sum over the robots' maps, so the order of
+//! messages does not matter. The input of each robot is its `map`: counts, mean offsets
 //! in the unit of the message, and the most frequent label.
 
 pub mod node;
@@ -30,51 +30,51 @@ pub struct MergerOptions {
     pub robots: Vec<String>,
     /// Frame that all maps must be in.
     pub map_frame: String,
-    /// Keys are counted from the lattice point next to this place, map frame; metres.
+    /// Origin of the keys: the lattice point nearest to this position, map frame; metres.
     pub datum_m: Vector3<f64>,
-    /// Most voxels of the merged map, and of each robot's.
+    /// Voxel limit of the merged map, and of each robot's.
     pub max_voxels: usize,
     /// Labels of the merged map.
     pub labels: MergedLabels,
-    /// Largest message.
+    /// Largest message, bytes.
     pub chunk_bytes: usize,
 }
 
 /// Labels of a merged map.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum MergedLabels {
-    /// None.
+    /// No labels.
     None,
-    /// Those of the robots' maps.
+    /// Labels of the robots' maps.
     Own,
-    /// The robots: label 0 is the first one, with as many points as it has in the voxel.
+    /// One label per robot: 0 is the first, weighted by its points in the voxel.
     Robots,
 }
 
 /// Counters of a merger.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize)]
 pub struct MergerCounts {
-    /// Messages of maps.
+    /// Received map messages.
     pub messages_in: u64,
     /// Messages that were malformed, or of a map that is too large.
     pub messages_refused: u64,
-    /// Times that a robot's map began anew.
+    /// Restarts of a robot's map.
     pub shares_replaced: u64,
-    /// Voxels that found the list full.
+    /// Voxels rejected by a full list.
     pub voxels_list_full: u64,
     /// Voxels more than 2^20 cells from the datum.
     pub voxels_out_of_range: u64,
-    /// Updates that were made.
+    /// Updates created.
     pub updates: u64,
-    /// Keyframes that were made.
+    /// Keyframes created.
     pub keyframes: u64,
 }
 
-/// Follows the maps of several robots and keeps their sum.
+/// Follows the maps of several robots and sums them.
 pub struct MapMerger {
     options: MergerOptions,
     robot_maps: Vec<RobotMap>,
-    /// None before the first robot's map is known.
+    /// `None` before the first robot's map.
     union: Option<VoxelList>,
     origin: Option<GeoPoint>,
     epoch: u64,
@@ -84,7 +84,7 @@ pub struct MapMerger {
 }
 
 impl MapMerger {
-    /// Has heard of no robot yet; `epoch` tells this map from earlier ones on the same topic.
+    /// Merger without maps; `epoch` distinguishes its map from earlier ones on the topic.
     pub fn new(options: MergerOptions, epoch: u64) -> Self {
         let robot_map = |_| RobotMap::new(MapFollower::new(options.max_voxels));
         Self {
@@ -99,7 +99,7 @@ impl MapMerger {
         }
     }
 
-    /// Goes on with other options; robots, frame, datum and labels stay as they are.
+    /// Changes the options, except robots, frame, datum and labels.
     pub fn set_options(&mut self, options: MergerOptions) {
         let (max_voxels, chunk_bytes) = (options.max_voxels, options.chunk_bytes);
         for robot_map in &mut self.robot_maps {
@@ -109,12 +109,12 @@ impl MapMerger {
         self.options.chunk_bytes = chunk_bytes;
     }
 
-    /// Takes a chunk of the keyframe of a robot.
+    /// Handles a keyframe chunk of a robot.
     pub fn on_map(&mut self, robot: usize, chunk: &LatticeMap) -> Result<Followed, FollowError> {
         self.follow(robot, |follower| follower.on_map(chunk))
     }
 
-    /// Takes a chunk of an update of a robot.
+    /// Handles an update chunk of a robot.
     pub fn on_update(
         &mut self,
         robot: usize,
@@ -137,7 +137,7 @@ impl MapMerger {
         followed
     }
 
-    /// Waits a second more for what is incomplete; gives the robots whose keyframe is to be asked for.
+    /// Advances the timeout of incomplete messages; returns the robots whose keyframe is to be requested.
     pub fn check_keyframe_timeout(&mut self) -> Vec<usize> {
         let waiting = self.robot_maps.iter_mut().enumerate();
         let waiting = waiting
@@ -145,7 +145,7 @@ impl MapMerger {
         waiting.collect()
     }
 
-    /// The changes of all robots since the call before, as one step of the sequence.
+    /// Changes of all robots since the last call, as one update.
     pub fn take_update(&mut self) -> Vec<LatticeMapUpdate> {
         for robot in 0..self.robot_maps.len() {
             self.admit(robot);
@@ -169,7 +169,7 @@ impl MapMerger {
         messages
     }
 
-    /// The whole map in self-contained chunks; none before a robot's map is known.
+    /// The whole map in self-contained chunks; empty before the first robot's map.
     pub fn keyframe(&mut self) -> Vec<LatticeMap> {
         self.counts.keyframes += 1;
         match &self.union {
@@ -178,7 +178,7 @@ impl MapMerger {
         }
     }
 
-    /// Takes the lattice of a robot's map if it is the first, else holds it against the merged one.
+    /// Adopts the lattice of the first robot's map, else checks compatibility with the merged one.
     fn admit(&mut self, robot: usize) {
         let options = &self.options;
         let Some(robot_map) = self.robot_maps.get_mut(robot) else {
@@ -205,12 +205,12 @@ impl MapMerger {
             Ok(origin) => self.origin = self.origin.or(origin),
             Err(refusal) => {
                 let name = options.robots.get(robot).map_or("", String::as_str);
-                log::warn!("the map of {name} is left out: {refusal}");
+                log::warn!("the map of {name} is not merged: {refusal}");
             }
         }
     }
 
-    /// Sums up the cells that changed in any share.
+    /// Sums the cells that changed in any map.
     fn sum_up(&mut self) {
         let Some(union) = &mut self.union else {
             return;
@@ -241,12 +241,12 @@ impl MapMerger {
         }
     }
 
-    /// Voxels of the merged map, none before a robot's map is known.
+    /// Voxels of the merged map, `None` before the first robot's map.
     pub fn list(&self) -> Option<&VoxelList> {
         self.union.as_ref()
     }
 
-    /// Robots whose map is part of the merged one, in the order of the options.
+    /// Maps of the robots, in the order of the options.
     pub fn robot_maps(&self) -> &[RobotMap] {
         &self.robot_maps
     }

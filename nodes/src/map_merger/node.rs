@@ -1,4 +1,4 @@
-//! The merger as a ROS node: a thin shell around [`MapMerger`].
+//! ROS node around [`MapMerger`].
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -22,7 +22,7 @@ use crate::start::{Finish, NodeError, handed_over, open_params};
 
 /// Event for the compute thread.
 enum Event {
-    /// Of a robot, by its place among the options.
+    /// Map chunk of a robot, by its index in the options.
     Map(usize, Undecoded<LatticeMap>),
     Update(usize, Undecoded<LatticeMapUpdate>),
     Publish,
@@ -36,7 +36,7 @@ struct MergerReport<'a> {
     counts: &'a MergerCounts,
     voxels: usize,
     robots: Vec<(&'a str, usize)>,
-    /// By robot.
+    /// Lost messages per robot.
     #[serde(flatten)]
     losses: BTreeMap<String, u64>,
     updates_not_published: u64,
@@ -103,7 +103,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// The publisher of the robots' names, which every later subscriber gets.
+/// Latched publisher of the robots' names.
 fn names(node: &Node, options: &MergerOptions) -> Result<Publisher<LabelInfo>, NodeError> {
     let classes = (0..)
         .zip(&options.robots)
@@ -166,7 +166,7 @@ impl Shell {
             }
         }
         let update = self.machine.take_update();
-        // Before the first robot there is no map that could be shown.
+        // Before the first robot there is no map to publish.
         if self.machine.list().is_some() {
             self.output.publish(update, || self.machine.keyframe());
         }
@@ -185,7 +185,7 @@ impl Shell {
         let (level, message) = if let Some((robot, refusal)) = refused {
             (
                 Level::Error,
-                format!("the map of {robot} is left out: {refusal}"),
+                format!("the map of {robot} is not merged: {refusal}"),
             )
         } else if counts.voxels_list_full > 0 {
             (Level::Warn, "the list is full (`max_voxels`)".to_owned())
@@ -204,7 +204,7 @@ impl Shell {
         self.diagnostics.set("merged map", level, message, values);
     }
 
-    /// Messages of each robot that did not come to the machine.
+    /// Lost messages of each robot.
     fn losses(&self) -> BTreeMap<String, u64> {
         let inputs = self.robots.iter().zip(&self.inputs);
         let losses = inputs.flat_map(|(robot, input)| {

@@ -1,4 +1,4 @@
-//! All parameters of the merger.
+//! Parameters of the merger.
 
 use std::time::Duration;
 
@@ -25,12 +25,12 @@ const LABELS: [(&str, MergedLabels); 3] = [
     ("none", MergedLabels::None),
 ];
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub merger: MergerOptions,
     pub limits: ComputeLimits,
     pub period: Duration,
-    /// Name of the mappers below the robots' namespaces.
+    /// Name of the mappers in the robots' namespaces.
     pub mapper: String,
     pub report_file: String,
 }
@@ -76,7 +76,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

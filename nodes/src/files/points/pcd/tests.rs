@@ -75,7 +75,7 @@ fn count_and_points_may_be_missing() {
 
 /// Changes of the header, and what the error says.
 const WRONG_HEADERS: &str = r#"
-    VERSION .7 | VERSION 0.5 | 1: "VERSION 0.5" is no line of a PCD 0.7 header
+    VERSION .7 | VERSION 0.5 | 1: "VERSION 0.5" is not a line of a PCD 0.7 header
     SIZE 1     | SIZE -1 | 3: "-1" is not a number without sign
     COUNT 3 1  | COUNT 3 | 10: FIELDS, SIZE, TYPE and COUNT have 5, 5, 5 and 4 entries, which must agree
     z x        | z X | 10: FIELDS are ["_", "z", "X", "normal", "y"], without all of x, y and z
