@@ -107,7 +107,7 @@ impl EnuTransformer {
                 "no transform {map} <- {base} on /tf: set `map_frame` and `base_frame` to frames that tf connects, or `ins.source` to another source of poses"
             ),
             source => format!(
-                "no pose came; `ins.source` is {source}: see that its topic is published, or choose another"
+                "no pose was received; `ins.source` is {source}: check that its topic is published, or choose another"
             ),
         }
     }

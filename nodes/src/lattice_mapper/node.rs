@@ -1,4 +1,4 @@
-//! The mapper as a ROS node: a thin shell around [`LatticeMapper`].
+//! ROS node around [`LatticeMapper`].
 
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, Once};
@@ -26,7 +26,7 @@ use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Level, Losses, Runtime, SubscriptionExecutor, WORKING, lock};
 
-/// Said where rays shall clear voxels and a cloud does not say where they begin.
+/// Warning for clouds without viewpoints while free space is on.
 const NO_VIEWPOINTS: &str = "no sensor positions (vp_x, vp_y, vp_z), so no free space: set `viewpoints: true` of enu_transformer";
 
 /// Event for the compute thread.
@@ -164,14 +164,14 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// Requests for the next update, kept whatever waits in the inbox.
+/// Requests for the next update, kept independently of the inbox.
 #[derive(Default)]
 struct Wishes {
     centers: AtomicBool,
     origin: Mutex<Option<Arc<GeoPointStamped>>>,
 }
 
-/// Hands over a timer's event; one that finds no room comes again with the next.
+/// Sends a timer event; one rejected by a full inbox is repeated at the next period.
 fn notify(inbox: &Inbox<Event>, event: Event) {
     if !inbox.send(event, 0) {
         log::debug!("the inbox is full");
@@ -185,21 +185,21 @@ struct Shell {
     output: MapOutput,
     outputs: Outputs,
     diagnostics: Diagnostics,
-    /// Until there is a map.
+    /// Present until there is a map.
     unmapped: Option<Unmapped>,
-    /// Clouds that found the inbox full.
+    /// Clouds rejected by a full inbox.
     lost: Arc<AtomicU64>,
-    /// Losses before it: of clouds, and of all inputs.
+    /// Losses before the inbox: of clouds, and of all inputs.
     clouds: Losses,
     inputs: Losses,
     refusals: Throttle,
     no_viewpoints: Once,
     wishes: Arc<Wishes>,
-    /// A map file on its way to the disk.
+    /// Thread that writes a map file.
     writing: Option<JoinHandle<()>>,
-    /// Place of map files.
+    /// Folder of map files.
     maps: MapFolder,
-    /// State of the map that the last centres are of.
+    /// State of the last published centres.
     centers_of: Option<(u64, u64)>,
     report_file: String,
 }
@@ -244,7 +244,7 @@ impl Shell {
         }
     }
 
-    /// Publishes what changed, and a keyframe where one was asked for or an update was lost.
+    /// Publishes an update, and a keyframe on request or after a lost update.
     fn update(&mut self) {
         if let Some(origin) = lock(&self.wishes.origin).take() {
             self.machine.on_origin(&origin);
@@ -267,7 +267,7 @@ impl Shell {
         }
     }
 
-    /// Publishes all free cells; one that joins later has them with the next time.
+    /// Publishes all free cells; late joiners receive the next message.
     fn free(&mut self) {
         let Some(publisher) = &self.outputs.free else {
             return;
@@ -294,7 +294,7 @@ impl Shell {
         }
     }
 
-    /// Clouds that found the inbox, or the queue before it, full.
+    /// Clouds rejected by a full inbox or overrun before it.
     fn clouds_inbox_full(&self) -> u64 {
         self.lost.load(Ordering::Relaxed) + self.clouds.overrun()
     }
@@ -324,10 +324,11 @@ impl Shell {
             let clouds = counts.clouds_no_viewpoint;
             (Level::Warn, format!("{clouds} clouds: {NO_VIEWPOINTS}"))
         } else if counts.ray_blocks_refused > 0 {
-            let problem = "rays have no room (`rays.max_bytes`): not all voxels are cleared";
+            let problem =
+                "the memory for rays is full (`rays.max_bytes`): not all voxels are cleared";
             (Level::Warn, problem.to_owned())
         } else if refused + lost > 0 {
-            let message = format!("{refused} clouds refused, {lost} lost");
+            let message = format!("{refused} clouds rejected, {lost} lost");
             (Level::Warn, message)
         } else if not_published > 0 {
             let message = format!("{not_published} parts of the map not published");
@@ -367,12 +368,12 @@ impl Shell {
             self.update();
         }
         self.centers();
-        // What is not sent by then counts.
+        // Messages not sent by then count as lost.
         self.output.flush();
         let (clouds, voxels) = (self.machine.counts().clouds_in, self.machine.cells().len());
         let points = self.machine.distortion().points;
         log::info!("{clouds} clouds, {points} points in {voxels} voxels");
-        // The report counts the bytes of a keyframe, which a map of millions of voxels takes seconds for.
+        // Only computed for a report: a keyframe of millions of voxels takes seconds.
         if self.report_file.is_empty() {
             return;
         }

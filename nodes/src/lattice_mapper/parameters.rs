@@ -1,4 +1,4 @@
-//! All parameters of the mapper.
+//! Parameters of the mapper.
 
 use std::time::Duration;
 
@@ -51,7 +51,7 @@ const ABOUT: &[About] = about! {
 
 const MAP: &str = "the map is made with it";
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub mapper: MapperOptions,
     pub limits: ComputeLimits,
@@ -59,7 +59,7 @@ pub(super) struct Settings {
     pub autosave: AutosaveOptions,
     pub update_period: Duration,
     pub centers_period: Duration,
-    /// Zero where there is no free space to publish.
+    /// Zero without free space to publish.
     pub free_period: Duration,
     pub octomap_services: bool,
     pub report_file: String,
@@ -94,20 +94,20 @@ impl Settings {
         })
     }
 
-    /// The same of a node that runs with `old` options.
+    /// Reads the parameters of a node that runs with `old` options.
     pub(super) fn changed(params: &Params, old: &MapperOptions) -> Result<Self, ParamError> {
         let settings = Self::from_params(params)?;
         match settings.mapper.payload().stamps == old.payload().stamps {
             true => Ok(settings),
             false => {
-                let problem = "voxels either have stamps from the start on or never";
+                let problem = "stamps of voxels cannot be switched on or off at run time";
                 Err(params.invalid("forget_after_s", problem))
             }
         }
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

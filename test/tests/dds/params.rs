@@ -53,8 +53,8 @@ fn refused() -> Vec<(Value, Value)> {
         ),
         same(
             json!([["forget_after_s", 5.0]]),
-            "parameter `forget_after_s` of /lattice_mapper = 5.0 (set at run time): voxels either \
-             have stamps from the start on or never",
+            "parameter `forget_after_s` of /lattice_mapper = 5.0 (set at run time): stamps of voxels \
+             cannot be switched on or off at run time",
         ),
         // The first could be set, and is not.
         (
