@@ -1,4 +1,4 @@
-//! The machine as a ROS node: a thin shell around [`Segmenter`].
+//! ROS node around [`Segmenter`].
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -19,7 +19,7 @@ use lattice_runtime::{Diagnostics, Losses, Publisher, Runtime};
 
 /// Event for the compute thread.
 enum Event {
-    /// There is an image in the slot.
+    /// An image is in the slot.
     Image,
     Diagnose,
     Settings(Box<SegmenterOptions>),
@@ -59,7 +59,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let wake = inbox.clone();
     let on_image = move |image: Input| {
         if slot.put(image) && !wake.send(Event::Image, 0) {
-            // The next one finds the place empty.
+            // The next image notifies again.
             slot.take_back();
         }
     };
@@ -89,10 +89,10 @@ struct Shell {
     label_info: Publisher<LabelInfo>,
     diagnostics: Diagnostics,
     losses: Losses,
-    /// Time of the last image in the network, seconds.
+    /// Inference time of the last image, seconds.
     last_s: f64,
     warnings: Throttle,
-    /// Images refused when there was a warning last.
+    /// Rejected images at the last warning.
     warned: u64,
     report_file: String,
 }
@@ -163,7 +163,7 @@ impl Shell {
             && self.warnings.check().is_some()
         {
             self.warned = refused;
-            log::warn!("{message}; last refused: {problem}");
+            log::warn!("{message}; last rejection: {problem}");
         }
         let mut values = report::key_values(&report);
         values.push(("last_image_s".into(), format!("{:.4}", self.last_s)));

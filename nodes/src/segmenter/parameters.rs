@@ -1,4 +1,4 @@
-//! All parameters of the node.
+//! Parameters of the node.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -20,7 +20,7 @@ const ABOUT: &[About] = about! {
     "max_image_pixels": "Images of more pixels are refused.";
 };
 
-/// Parameters of a network, whichever node runs it.
+/// Parameters of a network, in any node.
 pub(crate) const NETWORK: &[About] = about! {
     "model" fixed(MODEL): "A network that labels the images of colours inside this node, an ONNX file as segmenter takes it; empty: labels come from a topic.";
     "backend" fixed(MODEL): "What runs the network: tract, which is built in, or ort, the library of ONNX Runtime that ORT_DYLIB_PATH names (feature ort).";
@@ -33,12 +33,12 @@ pub(crate) const NETWORK: &[About] = about! {
     "compressed_color" fixed(options::TOPIC): "Whether images of colours are taken packed (JPEG), from the topic with /compressed behind its name.";
 };
 
-/// Longest time in which a network is made ready, about as long as somebody waits for a node to start.
+/// Timeout of loading a network, about as long as an operator waits for a node to start.
 const MAX_LOAD: Duration = Duration::from_secs(60);
-/// Time between two looks at the request to end.
+/// Period of checks for a shutdown request.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Result of `make`, on a thread of its own that is left alone if it does not end in time or the process is to.
+/// Result of `make` on a separate thread, which is abandoned at the timeout or a shutdown request.
 fn within<T: Send + 'static>(
     most: Duration,
     shutdown: &Shutdown,
@@ -48,7 +48,7 @@ fn within<T: Send + 'static>(
     let thread = thread::Builder::new().name("read network".to_owned());
     thread
         .spawn(move || {
-            // Nobody may wait for it any more.
+            // The receiver may be gone.
             let _ = done.send(make());
         })
         .map_err(|error| error.to_string())?;
@@ -56,14 +56,14 @@ fn within<T: Send + 'static>(
     loop {
         match made.recv_timeout(POLL) {
             Ok(made) => return Ok(made),
-            Err(RecvTimeoutError::Disconnected) => return Err("it cannot be read".to_owned()),
+            Err(RecvTimeoutError::Disconnected) => return Err("it cannot be parsed".to_owned()),
             Err(RecvTimeoutError::Timeout) if shutdown.is_requested() => {
                 return Err("reading it was interrupted".to_owned());
             }
             Err(RecvTimeoutError::Timeout) if begin.elapsed() > most => {
                 let seconds = most.as_secs_f64();
                 return Err(format!(
-                    "it is not ready after {seconds} s: take a smaller one"
+                    "loading takes more than {seconds} s: use a smaller model"
                 ));
             }
             Err(RecvTimeoutError::Timeout) => {}
@@ -71,7 +71,7 @@ fn within<T: Send + 'static>(
     }
 }
 
-/// A network by its parameters.
+/// Network settings from parameters.
 #[derive(Clone)]
 pub(crate) struct NetworkSettings {
     model: PathBuf,
@@ -93,7 +93,7 @@ impl NetworkSettings {
         Ok(Some(found).filter(|found| !found.model.as_os_str().is_empty()))
     }
 
-    /// Makes the network within [`MAX_LOAD`], or until the process is to end.
+    /// Loads the network within [`MAX_LOAD`], or until a shutdown request.
     pub(crate) fn read(
         &self,
         params: &Params,
@@ -138,10 +138,10 @@ impl NetworkSettings {
     }
 }
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub segmenter: SegmenterOptions,
-    /// None: no model is given.
+    /// `None`: no model is given.
     pub network: Option<NetworkSettings>,
     pub compressed: bool,
     pub limits: ComputeLimits,
@@ -160,7 +160,7 @@ impl Settings {
             compressed: params.bool("compressed", false)?,
             limits: ComputeLimits {
                 events: 16,
-                // The image that waits is the newest; none other does.
+                // Only the newest image waits.
                 bytes: usize::MAX,
                 threads: 1,
             },
@@ -169,7 +169,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

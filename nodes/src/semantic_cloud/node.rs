@@ -1,4 +1,4 @@
-//! The machine as a ROS node: a thin shell around [`SemanticCloud`].
+//! ROS node around [`SemanticCloud`].
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -21,20 +21,20 @@ use lattice_runtime::{
     Diagnostics, Level, Losses, Node, Publisher, Runtime, Subscription, SubscriptionExecutor,
 };
 
-/// Most depth images whose arrival is remembered.
+/// Limit of stored arrival times of depth images.
 const MAX_ARRIVALS: usize = 256;
-/// Images of colours.
+/// Topic of colour images.
 const COLOR: &str = "rgb/image_rect_color";
 
 /// Event for the compute thread.
 enum Event {
-    /// An image, and when it came.
+    /// An image with its arrival time.
     Image(Stream, Arc<Image>, Instant),
     CompressedDepth(Arc<CompressedImage>, Instant),
     CompressedColor(Arc<CompressedImage>),
     CameraInfo(Arc<CameraInfo>),
     LabelInfo(Arc<LabelInfo>),
-    /// Of the network inside of the node.
+    /// Event of the built-in network.
     Network(NetworkEvent),
     Diagnose,
     Settings(Box<CloudOptions>),
@@ -196,15 +196,15 @@ struct Shell {
     label_info: Publisher<LabelInfo>,
     network: Option<Outputs>,
     diagnostics: Diagnostics,
-    /// Messages that found the inbox full, and those lost before it.
+    /// Messages rejected by the inbox or lost before it.
     lost: Arc<AtomicU64>,
     losses: Losses,
-    /// Stamps of depth images, and when they came.
+    /// Stamps of depth images with their arrival times.
     arrivals: VecDeque<(i64, Instant)>,
-    /// From the arrival of a depth image to its cloud, seconds.
+    /// Latency from a depth image to its cloud, seconds.
     last_latency_s: f64,
     warnings: Throttle,
-    /// Messages dropped when there was a warning last.
+    /// Dropped messages at the last warning.
     warned: u64,
     report_file: String,
 }
@@ -258,7 +258,7 @@ impl Shell {
         }
     }
 
-    /// Names of the classes of the network inside of the node.
+    /// Publishes the class names of the built-in network.
     fn tell_names(&mut self) {
         let info = self.network.as_ref().and_then(Outputs::tell_names);
         if let Some(info) = info {
@@ -306,7 +306,7 @@ impl Shell {
         let dropped: u64 = counts.dropped.values().sum();
         let problem = self.machine.problem().map(str::to_owned);
         let message = match (self.machine.has_camera(), dropped) {
-            (false, _) => "no camera_info yet that can be used".to_owned(),
+            (false, _) => "no valid camera_info yet".to_owned(),
             (true, 0) if counts.clouds_out == 0 => "no cloud yet".to_owned(),
             (true, 0) => "making clouds".to_owned(),
             (true, _) => {
@@ -324,7 +324,7 @@ impl Shell {
             && self.warnings.check().is_some()
         {
             self.warned = dropped;
-            log::warn!("{message}; last refused: {problem}");
+            log::warn!("{message}; last rejection: {problem}");
         }
         let mut values = report::key_values(&report);
         values.push(("images_waiting".into(), self.machine.waiting().to_string()));

@@ -1,4 +1,4 @@
-//! All parameters of the node.
+//! Parameters of the node.
 
 use super::CloudOptions;
 use crate::compute::ComputeLimits;
@@ -24,10 +24,10 @@ const ABOUT: &[About] = about! {
     "group_labels": "Classes that count as others: class, group, class, group and so on.";
 };
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub cloud: CloudOptions,
-    /// Network inside of the node, with its options.
+    /// Built-in network with its options.
     pub network: Option<(NetworkSettings, SegmenterOptions)>,
     pub compressed_color: bool,
     pub compressed_depth: bool,
@@ -51,7 +51,7 @@ impl Settings {
         let of_network = SegmenterOptions::of_network(params, cloud.max_image_pixels, with_soft)?;
         let network = NetworkSettings::from_params(params)?;
         if network.is_some() {
-            // They come with the labels.
+            // They are delivered with the labels.
             (cloud.pair.with_confidence, cloud.pair.with_color) = (false, false);
         }
         let compressed_color = params.bool("compressed_color", false)?;
@@ -74,7 +74,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

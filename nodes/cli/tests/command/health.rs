@@ -123,7 +123,7 @@ fn a_mapper_is_not_well_until_it_has_mapped_a_cloud() {
     });
     until(
         false,
-        "the last was refused: cloud in frame 'velodyne', expected 'map'",
+        "the last rejected: cloud in frame 'velodyne', expected 'map'",
     );
     *frame.lock().unwrap() = "map";
     until(true, "OK lattice_mapper: inputs: publishers on all topics");
