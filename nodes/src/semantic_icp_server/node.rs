@@ -1,4 +1,4 @@
-//! The server as a ROS node: a thin shell around [`SemanticIcpServer`].
+//! ROS node around [`SemanticIcpServer`].
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ use lattice_runtime::{
     ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Losses, Reply, Runtime, Undecoded, lock,
 };
 
-/// Between two messages on diagnostics.
+/// Period of the diagnostic status.
 const DIAGNOSE: Duration = Duration::from_secs(1);
 
 /// Event for the thread of the machine.
@@ -43,7 +43,7 @@ enum Event {
     LabelInfo(Arc<LabelInfo>),
     Request(Box<CalibrateRequest>, Reply<CalibrateResponse>),
     Goal(Box<CalibrateGoal>, GoalHandle<CalibrateAction>),
-    /// A client has canceled, or the searcher has news.
+    /// A client has canceled, or the search thread has events.
     Look,
     Tick,
     Diagnose,
@@ -95,7 +95,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         search,
         move || notify(&wake, Event::Look),
     )?;
-    // The first of all events.
+    // First event of the inbox.
     notify(&inbox, Event::SearchPort(thread.port()));
 
     let (to, missed, part) = (inbox.clone(), Arc::clone(&lost), Arc::clone(&map_lost));
@@ -124,10 +124,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let infos = node.subscribe("headset/label_info", Qos::LATCHED, Shared, on_info)?;
 
     losses.watch([&maps, &updates, &clouds, &sessions, &infos]);
-    // A headset comes when its wearer does.
+    // A headset may join at any time.
     node.expect_publishers([&maps], "lattice_mapper", None, |_| true);
     let to = inbox.clone();
-    // One answer does not wait for another: a busy server says so at once.
+    // Replies are concurrent, so that a busy server can reject at once.
     let service =
         node.service_concurrent::<Calibrate>("~/calibrate", 16, move |request, reply| {
             let busy = reply.clone();
@@ -170,38 +170,38 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// Hands over a message, or counts it as lost and returns false.
+/// Sends a message event; a rejected one is counted as lost and returns false.
 fn hand_over(inbox: &Inbox<Event>, event: Event, bytes: usize, lost: &AtomicU64) -> bool {
     let sent = inbox.send(event, bytes);
     lost.fetch_add(u64::from(!sent), Ordering::Relaxed);
     sent
 }
 
-/// Hands over what comes again with the next tick.
+/// Sends an event that the next tick repeats.
 fn notify(inbox: &Inbox<Event>, event: Event) {
     if !inbox.send(event, 0) {
         log::debug!("the inbox is full");
     }
 }
 
-/// A client that waits.
+/// A waiting client.
 enum Client {
     Service(Reply<CalibrateResponse>),
     Action(GoalHandle<CalibrateAction>, Feedback<CalibrateAction>),
 }
 
-/// State of the machine's thread.
+/// State of the compute thread.
 struct Shell {
     machine: SemanticIcpServer,
     search: Option<SearchPort>,
     outputs: Outputs,
     diagnostics: Diagnostics,
     clock: Clock,
-    /// Messages that found the inbox full.
+    /// Messages rejected by a full inbox.
     lost: Arc<AtomicU64>,
-    /// Losses before it.
+    /// Losses before the inbox.
     losses: Losses,
-    /// A part of the map is one of them.
+    /// True if map messages are among them.
     map_lost: Arc<AtomicBool>,
     calls: BTreeMap<CallId, Client>,
     next_call: CallId,
@@ -283,7 +283,7 @@ impl Shell {
         self.next_call
     }
 
-    /// Takes what the searcher has found, and what clients do not want any more.
+    /// Handles search events and canceled requests.
     fn look(&mut self, now_ns: i64) {
         let search = self.search.as_ref();
         let progress = search.and_then(SearchPort::take_progress);
@@ -327,7 +327,7 @@ impl Shell {
                 }
                 Output::Job(job) => {
                     if !self.search.as_ref().is_some_and(|search| search.begin(job)) {
-                        log::error!("the searching thread takes no job");
+                        log::error!("the search thread accepts no job");
                     }
                 }
                 Output::Answer(call, end, result) => self.answer(call, end, *result),
@@ -340,7 +340,7 @@ impl Shell {
                     if self.requests.check().is_some()
                         && let Err(error) = self.outputs.request.publish(Empty::default())
                     {
-                        log::debug!("keyframe not asked for: {error}");
+                        log::debug!("keyframe not requested: {error}");
                     }
                 }
             }

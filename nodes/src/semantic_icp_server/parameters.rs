@@ -1,4 +1,4 @@
-//! All parameters of the server.
+//! Parameters of the server.
 
 use std::time::Duration;
 
@@ -47,7 +47,7 @@ const ABOUT: &[About] = about! {
     "threads" fixed("the pool is made with it"): "Threads that search; 0: one less than the machine has.";
 };
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub server: ServerOptions,
     pub limits: ComputeLimits,
@@ -78,7 +78,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

@@ -1,4 +1,4 @@
-//! All parameters of the marker publisher.
+//! Parameters of the marker publisher.
 
 use std::time::Duration;
 
@@ -22,12 +22,12 @@ const ABOUT: &[About] = about! {
     "max_bytes_per_s": "Most bytes a second that are published.";
 };
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub markers: MarkerOptions,
     pub limits: ComputeLimits,
     pub period: Duration,
-    /// Most bytes of a period.
+    /// Byte budget per period.
     pub budget_bytes: usize,
     pub mapper: String,
     pub report_file: String,
@@ -41,7 +41,7 @@ impl Settings {
         let rate_hz = params.f64_in("rate_hz", 5.0, 0.1..=100.0)?;
         let bytes_per_s = params.positive("max_bytes_per_s", 20_000_000)?;
         let markers = MarkerOptions::from_params(params)?;
-        // Two arrays in a row are longer than one may be, so these find room in the history and in the queue.
+        // Two consecutive arrays exceed the size of one, so these fit into the history and the queue.
         let most_bytes = Qos::MARKERS.depth / 2 * markers.chunk_bytes;
         Ok(Self {
             limits: ComputeLimits {
@@ -58,7 +58,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }
