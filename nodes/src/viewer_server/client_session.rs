@@ -1,4 +1,4 @@
-//! The session at which one client asks: what is offered there, what it may ask, how much at a time.
+//! Protocol state, permissions and limits of one client.
 
 use std::collections::BTreeMap;
 
@@ -6,63 +6,63 @@ use super::inputs::Input;
 use super::offer::{MAX_MESSAGE_BYTES, Offer, OpenTopic};
 use super::protocol::{self, ClientChannel, ClientData, ClientMessage, Value, Wish};
 
-/// Most questions of a client that wait for their answers.
+/// Limit of requests without reply per client.
 const MAX_IN_FLIGHT: usize = 16;
-/// Most channels of a client.
+/// Limit of channels per client.
 const MAX_CHANNELS: usize = 32;
 
-/// A question that others answer.
+/// Request that the bridge executes.
 #[derive(Debug, PartialEq)]
 pub enum BridgeRequest {
-    /// Call of a service.
+    /// Service call.
     Call {
-        /// Its id.
+        /// Service id.
         service: u32,
-        /// By which the client knows the answer.
+        /// Call id of the client.
         call: u32,
         /// CDR.
         request: Vec<u8>,
     },
-    /// Values of parameters.
+    /// Read parameters.
     GetParameters(Vec<String>, Option<String>),
-    /// Other values.
+    /// Set parameters.
     SetParameters(Vec<Value>, Option<String>),
-    /// A message, on the topic of this place in the offer.
+    /// Publish a message on an offered topic, by its index.
     Publish(usize, Vec<u8>),
 }
 
-/// Consequence of a message of a client.
+/// Action for a client message.
 #[derive(Debug, PartialEq)]
 pub enum SessionAction {
-    /// It wants channels.
+    /// Subscribe to channels.
     Subscribe(Vec<Wish>),
-    /// It wants them no more.
+    /// Unsubscribe.
     Unsubscribe(Vec<u32>),
-    /// It wants to hear of changes of these parameters, none for all, or does no longer.
+    /// Start or stop watching these parameters; none: all.
     Watch(Vec<String>, bool),
-    /// It wants the graph of nodes, or does no longer.
+    /// Start or stop following the node graph.
     Graph(bool),
-    /// Something is to be asked for.
+    /// Pass a request to the bridge.
     Request(BridgeRequest),
-    /// A message for a headset's topic, which is not answered.
+    /// Publish a message on a headset topic, without a reply.
     Input(Input),
-    /// A text for the client.
+    /// Send a text to the client.
     Reply(String),
-    /// Nothing.
+    /// No action.
     Done,
 }
 
-/// The state of one client.
+/// Session of one client.
 #[derive(Debug)]
 pub struct ClientSession<'a> {
     offer: &'a Offer,
-    /// Topics of the offer by the client's channels; true for those in JSON.
+    /// Offered topics by the client's channel id; true for JSON.
     channels: BTreeMap<u32, (usize, bool)>,
     in_flight: usize,
 }
 
 impl<'a> ClientSession<'a> {
-    /// A session at which nobody has asked.
+    /// Session without requests.
     pub fn new(offer: &'a Offer) -> Self {
         Self {
             offer,
@@ -71,7 +71,7 @@ impl<'a> ClientSession<'a> {
         }
     }
 
-    /// Takes a text message.
+    /// Handles a text message.
     pub fn on_text(&mut self, text: &str) -> SessionAction {
         use SessionAction::{Done, Graph, Subscribe, Unsubscribe, Watch};
         if text.len() > MAX_MESSAGE_BYTES {
@@ -110,12 +110,12 @@ impl<'a> ClientSession<'a> {
                     .for_each(|id| _ = self.channels.remove(id));
                 Done
             }
-            Ok(_) => reject("this is not offered here; writing is off unless `allow_write` is on"),
+            Ok(_) => reject("operation not offered; writing requires `allow_write`"),
             Err(error) => reject(&error.to_string()),
         }
     }
 
-    /// Takes a binary message.
+    /// Handles a binary message.
     pub fn on_binary(&mut self, bytes: &[u8]) -> SessionAction {
         match ClientData::parse(bytes) {
             Ok(ClientData::Message { channel, payload }) => self.message(channel, payload),
@@ -131,10 +131,10 @@ impl<'a> ClientSession<'a> {
                 let refuse =
                     |why: &str| SessionAction::Reply(protocol::service_failure(service, call, why));
                 if service as usize >= self.offer.services.len() {
-                    return refuse("there is no such service; `allow_write` may be off");
+                    return refuse("unknown service; writing requires `allow_write`");
                 }
                 if encoding != b"cdr" {
-                    return refuse("requests are taken as cdr alone");
+                    return refuse("the encoding of requests must be cdr");
                 }
                 let request = payload.to_vec();
                 match self.request(BridgeRequest::Call {
@@ -152,7 +152,9 @@ impl<'a> ClientSession<'a> {
 
     fn message(&mut self, channel: u32, payload: &[u8]) -> SessionAction {
         let Some(&(topic, is_json)) = self.channels.get(&channel) else {
-            return reject(&format!("channel {channel} is not yours to publish on"));
+            return reject(&format!(
+                "channel {channel} was not advertised by this client"
+            ));
         };
         let streams = self.offer.topics.get(topic);
         if streams.is_some_and(|topic| topic.stream_bytes.is_some()) {
@@ -169,7 +171,7 @@ impl<'a> ClientSession<'a> {
         }
     }
 
-    /// To be called for each answer.
+    /// To be called for each reply.
     pub fn answered(&mut self) {
         self.in_flight = self.in_flight.saturating_sub(1);
     }
@@ -206,7 +208,7 @@ impl<'a> ClientSession<'a> {
 }
 
 const TOO_LONG: &str = "a message above 64 kB";
-const TOO_MANY: &str = "too many questions wait for their answers";
+const TOO_MANY: &str = "too many requests without a reply; wait for replies";
 
 fn reject(problem: &str) -> SessionAction {
     SessionAction::Reply(protocol::status(problem))
@@ -215,7 +217,7 @@ fn reject(problem: &str) -> SessionAction {
 fn refusal(channel: &ClientChannel, topics: &[OpenTopic]) -> String {
     let open = topics.iter().map(|topic| topic.name.as_str());
     format!(
-        "channel {} is not taken: topics that are open, as cdr: {}",
+        "channel {} is rejected; open topics, as cdr: {}",
         channel.id,
         open.collect::<Vec<_>>().join(", ")
     )

@@ -33,21 +33,21 @@ const HEAD_TIME: Duration = Duration::from_secs(5);
 const ANSWER_TIME: Duration = Duration::from_secs(20);
 /// Time for the reason of an end to be taken.
 const LAST_TIME: Duration = Duration::from_secs(1);
-/// Bytes that the kernel keeps until a client takes them.
+/// Socket send buffer, bytes.
 const SEND_BUFFER_BYTES: usize = 512 << 10;
 
 type Stream = Async<TcpStream>;
 
-/// Room for connections that are no client; clients have [`Broadcaster`]'s.
+/// Limits of connections before they become clients; clients are limited by [`Broadcaster`].
 #[derive(Default)]
 pub struct Rooms {
-    /// Those whose request has not come.
+    /// Connections with an incomplete request.
     asking: Rc<Room>,
-    /// Those that are answered.
+    /// Connections whose response is being sent.
     answered: Rc<Room>,
 }
 
-/// Serves a connection to its end.
+/// Serves a connection until it ends.
 pub async fn serve(
     stream: TcpStream,
     from: IpAddr,
@@ -104,14 +104,14 @@ async fn read_head(stream: &mut Stream) -> io::Result<Result<Head, HeadError>> {
         length += read;
         match Head::parse(bytes.get(..length).unwrap_or_default()) {
             Ok(None) => {}
-            // Nobody who speaks the protocol sends more before the answer.
+            // Clients send nothing more before the response.
             Ok(Some((head, _))) => return Ok(Ok(head)),
             Err(error) => return Ok(Err(error)),
         }
     }
 }
 
-/// Sends what waits and takes what comes until either side ends it.
+/// Sends queued messages and handles received ones until either side closes.
 async fn talk(
     mut stream: ClientStream,
     head: String,
@@ -131,7 +131,7 @@ async fn talk(
     let mut flow = Flow::new(offer.stream_bytes_per_s, Instant::now());
     let mut asked = FuturesUnordered::new();
     loop {
-        // What has come goes first: who unsubscribes gets no more.
+        // Received messages first, so that an unsubscription takes effect at once.
         let event = match poll_once(socket.next()).await {
             Some(come) => Event::Come(come),
             None => match broadcaster.next(id) {
@@ -156,7 +156,7 @@ async fn talk(
             },
         };
         if matches!(event, Event::Come(_)) {
-            // A client that sends without end does not hold up the others of this thread.
+            // A client that sends continuously must not block the others of this thread.
             yield_now().await;
         }
         let step = match event {
@@ -168,7 +168,7 @@ async fn talk(
                     .for_each(|message| broadcaster.enqueue(id, message));
                 SessionAction::Done
             }
-            // Before anything is made of it.
+            // Rate limited before parsing.
             Event::Come(Some(Ok(message))) if !is_paced(&mut flow, message.len()) => {
                 let refusal = InputRefusal::TooMuch;
                 if let Some(bridge) = broadcaster.bridge() {
@@ -180,7 +180,7 @@ async fn talk(
             Event::Come(Some(Ok(Message::Text(text)))) => session.on_text(&text),
             Event::Come(Some(Ok(Message::Binary(bytes)))) => session.on_binary(&bytes),
             Event::Come(Some(Ok(Message::Close(_))) | None) => return Ok(()),
-            // Before more is read, or a client that pings without end would fill the memory with answers.
+            // Flushed before reading more: continuous pings would fill the memory with pongs.
             Event::Come(Some(Ok(Message::Ping(_)))) => {
                 let answer = async { socket.flush().await.map_err(io::Error::other) };
                 progress.sent(answer).await?;
@@ -227,15 +227,15 @@ enum Event {
     Woken,
 }
 
-/// True of a message that is short, as questions are, or that comes at the pace of headsets.
+/// True for a short message, or one within the rate limit of headsets.
 fn is_paced(flow: &mut Flow, bytes: usize) -> bool {
     bytes <= MAX_MESSAGE_BYTES || flow.admits(bytes, Instant::now())
 }
 
-/// Hands a message for a headset over, at the pace of its client; what is refused is counted.
+/// Passes a headset message to the bridge within the client's rate limit; rejected ones are counted.
 fn take(broadcaster: &Broadcaster, id: u64, flow: &mut Flow, input: Input) -> Option<InputRefusal> {
     let bridge = broadcaster.bridge()?;
-    // A long one was asked for its pace when it came.
+    // A long message was charged on reception.
     let head_and_message = input.bytes.len() + MESSAGE_HEAD_BYTES;
     let is_long = head_and_message > MAX_MESSAGE_BYTES;
     let taken = match is_long || flow.admits(input.bytes.len(), Instant::now()) {
@@ -247,7 +247,7 @@ fn take(broadcaster: &Broadcaster, id: u64, flow: &mut Flow, input: Input) -> Op
     Some(refusal)
 }
 
-/// Tells why the connection ends: what comes next of it cannot be told from the rest of the message.
+/// Closes the connection with a reason: the rest of an oversized message cannot be skipped.
 async fn too_long(socket: &mut WebSocketStream<ClientStream>, broadcaster: &Broadcaster) {
     let has_headset = broadcaster.offer_of_bridge().stream_bytes_per_s > 0;
     if let Some(bridge) = broadcaster.bridge().filter(|_| has_headset) {
@@ -257,22 +257,22 @@ async fn too_long(socket: &mut WebSocketStream<ClientStream>, broadcaster: &Broa
         code: CloseCode::Size,
         reason: match has_headset {
             true => InputRefusal::TooLong.words().into(),
-            false => "a message is longer than is taken".into(),
+            false => "the message exceeds the size limit".into(),
         },
     };
     let closed = async {
         let sent = socket.send(Message::Close(Some(close))).await;
         sent.map_err(io::Error::other)?;
-        // A socket closed with bytes unread is reset, and the reason is lost with it.
+        // Closing a socket with unread bytes resets it, which would lose the reason.
         let mut rest = vec![0; 1 << 16];
         while socket.get_mut().read(&mut rest).await? > 0 {}
         Ok(())
     };
-    // Who has gone needs no reason.
+    // The client may be gone.
     let _ = within(LAST_TIME, closed).await;
 }
 
-/// Sends one message; an error after the last.
+/// Sends one message; [`Outgoing::Close`] is an error.
 async fn send(
     socket: &mut WebSocketStream<ClientStream>,
     progress: &Progress,

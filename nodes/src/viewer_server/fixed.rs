@@ -1,4 +1,4 @@
-//! A map that does not change, shown without ROS.
+//! Viewer of a constant map, without ROS.
 
 use std::io;
 use std::sync::Arc;
@@ -16,15 +16,15 @@ use super::server::Server;
 use super::thin;
 use crate::convert::map::{History, MapStamp, keyframe};
 
-/// Largest message of the map.
+/// Largest map message, bytes.
 const CHUNK_BYTES: usize = 60_000;
 
-/// Serves a map; gives the server and the address to open.
+/// Serves a map; returns the server and its URL.
 pub fn serve(list: &VoxelList, options: &ViewerOptions) -> io::Result<(Server, String)> {
     serve_labelled(list, &LabelNames::new(), options)
 }
 
-/// [`serve`] with the names of the map's labels.
+/// Serves a map with the names of its labels.
 pub fn serve_labelled(
     list: &VoxelList,
     names: &LabelNames,

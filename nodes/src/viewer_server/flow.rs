@@ -1,11 +1,11 @@
-//! The pace at which one client may send what a headset sees.
+//! Rate limit of headset messages from one client.
 
 use std::time::Instant;
 
-/// Bytes that the shortest message counts as.
+/// Smallest charged message size, bytes.
 const MIN_MESSAGE_BYTES: usize = 4096;
 
-/// Bytes that a client may still send: a second's worth at most, which time brings back.
+/// Token bucket in bytes, with the capacity of one second.
 #[derive(Debug)]
 pub struct Flow {
     bytes_per_s: f64,
@@ -14,7 +14,7 @@ pub struct Flow {
 }
 
 impl Flow {
-    /// The flow of a client that comes now.
+    /// Full bucket of a new client.
     pub fn new(bytes_per_s: usize, now: Instant) -> Self {
         let bytes_per_s = bytes_per_s as f64;
         Self {
@@ -24,7 +24,7 @@ impl Flow {
         }
     }
 
-    /// True if a message of so many bytes is not too much now; it is then taken off.
+    /// True if a message of `bytes` is within the limit; it is then charged.
     pub fn admits(&mut self, bytes: usize, now: Instant) -> bool {
         let passed_s = now.saturating_duration_since(self.at).as_secs_f64();
         self.at = now;

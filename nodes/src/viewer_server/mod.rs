@@ -1,7 +1,7 @@
-//! The viewer server: a page that draws the map, and a Foxglove WebSocket, on one port.
+//! `viewer_server`: a web page with the map, and a Foxglove WebSocket, on one port.
 //!
-//! The node's thread follows the map and offers messages to a [`Broadcaster`]; the server's thread gives each
-//! client what it wants, at the client's pace.
+//! The node's thread follows the map and passes messages to a [`Broadcaster`]; the server's thread sends them to each
+//! client at the client's rate.
 
 mod bridge;
 mod broadcaster;

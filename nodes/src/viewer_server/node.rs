@@ -1,4 +1,4 @@
-//! The viewer server as a ROS node: subscriptions, the server's thread, and what is between.
+//! ROS node of the viewer: subscriptions, server thread and compute thread.
 
 use std::io::Write;
 use std::sync::Arc;
@@ -34,7 +34,7 @@ enum Event {
     Update(Undecoded<LatticeMapUpdate>),
     FixedTransforms(Arc<TFMessage>),
     Message(u32, Unwritten),
-    /// Of a client, for a headset's topic.
+    /// Client message for a headset topic.
     Input(u64, Input),
     Tick,
     Finish,
@@ -46,7 +46,7 @@ impl FromChannel for Event {
     }
 }
 
-/// Report of a server at its end.
+/// Report of the viewer.
 #[derive(Serialize)]
 struct ViewerReport {
     counts: BroadcasterCounts,
@@ -87,7 +87,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         seconds: Throttle::new(Duration::from_secs(1)),
         report_file,
     };
-    // Made by the compute thread's handler at its first event.
+    // Received by the compute thread's handler at its first event.
     let (give, take) = crossbeam_channel::bounded(1);
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
         if shell.parts.is_none() {
@@ -101,7 +101,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     broadcaster.set_bridge(Box::new(bridge));
     let sources = Sources::new(&node, &broadcaster, &viewer, &inbox)?;
     let _ = give.send(Parts { sources, headset });
-    // Who listens comes after the channels: the list of them is sent once.
+    // Started after the channels exist: clients receive the channel list once.
     let server = Server::start(viewer.address, auth.clone(), Arc::clone(&broadcaster))?;
     tell_address(&url(server.address(), &auth), auth.token.is_some());
     let maps = losses.subscribe(&node, &inbox, Event::Map, Event::Update)?;
@@ -133,7 +133,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// Hands messages of clients over to the compute thread.
+/// Sends client messages to the compute thread.
 fn hand_over(inbox: &Inbox<Event>, waiting: Arc<Waiting>) -> HandOver {
     let inbox = inbox.clone();
     Box::new(move |client, input| {
@@ -149,18 +149,20 @@ fn hand_over(inbox: &Inbox<Event>, waiting: Arc<Waiting>) -> HandOver {
     })
 }
 
-/// Parts of the compute thread that are made once it runs.
+/// Parts created on the compute thread.
 struct Parts {
     sources: Sources,
     headset: HeadsetTopics,
 }
 
-/// Says where the page is. A token is for the terminal alone: others read `/rosout` and log files.
+/// Logs the URL of the page. A URL with a token is printed to the terminal only: `/rosout` and log files are public.
 fn tell_address(url: &str, has_token: bool) {
     match has_token {
         true => {
-            log::info!("the address of the map has a token, which the terminal alone is told");
-            // A terminal that is gone is no reason to stop.
+            log::info!(
+                "the address of the map contains a token and is printed to the terminal only"
+            );
+            // A closed terminal is not an error.
             let _ = writeln!(std::io::stderr(), "the map is at {url}");
         }
         false => log::info!("the map is at {url}"),
@@ -201,7 +203,7 @@ impl Shell {
             }
             Event::Message(channel, message) => match message() {
                 Ok(cdr) => self.broadcaster.offer(channel, cdr),
-                Err(error) => log::debug!("not passed on: {error}"),
+                Err(error) => log::debug!("not forwarded: {error}"),
             },
             Event::Input(client, input) => self.pass(client, &input),
             Event::Tick => self.tick(),
@@ -209,7 +211,7 @@ impl Shell {
         }
     }
 
-    /// Publishes a client's message on its topic, or tells the client why not.
+    /// Publishes a client's message, or notifies the client of the reason for its rejection.
     fn pass(&mut self, client: u64, input: &Input) {
         self.waiting.leave(input.bytes.len());
         let Some(parts) = &self.parts else { return };
@@ -241,7 +243,7 @@ impl Shell {
         }
     }
 
-    /// Gives clients what has changed, and a keyframe where one is wanted.
+    /// Sends map changes to clients, and a keyframe if needed.
     fn feed(&mut self) {
         match self.source.take_change() {
             Ok(MapChange::Unchanged) => {}
@@ -249,18 +251,18 @@ impl Shell {
             Ok(MapChange::Updates(updates)) => self
                 .broadcaster
                 .change_map(|stream| updates.into_iter().for_each(|update| stream.push(update))),
-            Err(error) => log::warn!("the map was not passed on: {error}"),
+            Err(error) => log::warn!("the map was not sent to clients: {error}"),
         }
         if !self.broadcaster.keyframe_wanted() {
             return;
         }
-        // Not within the lock: it takes a while, and only this thread changes the map.
+        // Outside the lock: encoding takes time, and only this thread changes the map.
         match self.source.keyframe() {
             Ok(Some(chunks)) => self
                 .broadcaster
                 .change_map(|stream| stream.set_keyframe(chunks)),
             Ok(None) => {}
-            Err(error) => log::warn!("the map was not passed on: {error}"),
+            Err(error) => log::warn!("the map was not sent to clients: {error}"),
         }
     }
 
@@ -291,7 +293,7 @@ impl Shell {
                 let refused = inputs.headset_refused.iter();
                 let refused = refused.map(|(reason, n)| format!("{n} {reason}"));
                 let refused: Vec<_> = refused.collect();
-                let message = format!("{clients} clients; refused: {}", refused.join(", "));
+                let message = format!("{clients} clients; rejected: {}", refused.join(", "));
                 (Level::Warn, message)
             }
         };

@@ -1,4 +1,4 @@
-//! Parameters of the viewer server.
+//! Options of the viewer.
 
 use std::io::Read;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -7,24 +7,24 @@ use lattice_runtime::params::{ParamError, Params};
 
 use super::http::RequestAuth;
 
-/// Options of the viewer server.
+/// Options of the viewer.
 #[derive(Clone, Debug)]
 pub struct ViewerOptions {
     /// Address and port to listen on.
     pub address: SocketAddr,
-    /// Names by which this machine may be called, besides `localhost` and addresses.
+    /// Host names of this machine, besides `localhost` and addresses.
     pub allowed_hosts: Vec<String>,
-    /// Origins of pages from elsewhere that may connect.
+    /// Allowed cross-origin pages.
     pub allowed_origins: Vec<String>,
-    /// Secret that clients must know; empty: none on loopback, else a random one.
+    /// Required secret of clients; empty: none on loopback, else a random one.
     pub token: String,
-    /// Most clients at a time.
+    /// Limit of clients.
     pub max_clients: usize,
-    /// Largest map followed.
+    /// Voxel limit of the followed map.
     pub max_voxels: usize,
-    /// Time between two messages of updates to clients, in s.
+    /// Period of map updates to clients, s.
     pub update_period_s: f64,
-    /// Topics of clouds that are shown.
+    /// Topics of displayed clouds.
     pub cloud_topics: Vec<String>,
 }
 
@@ -72,7 +72,7 @@ impl ViewerOptions {
         })
     }
 
-    /// Conditions of entry. Without a token only this machine may; where none is given, one is made.
+    /// Conditions for accepting requests. Without a token only loopback is served; elsewhere a missing token is generated.
     pub fn request_auth(&self) -> std::io::Result<RequestAuth> {
         let token = match (self.token.is_empty(), self.address.ip().is_loopback()) {
             (false, _) => Some(self.token.clone()),
@@ -87,7 +87,7 @@ impl ViewerOptions {
     }
 }
 
-/// The address to open in a browser.
+/// URL for a browser.
 pub fn url(address: SocketAddr, auth: &RequestAuth) -> String {
     let host = match address.ip().is_unspecified() {
         true => SocketAddr::new(Ipv4Addr::LOCALHOST.into(), address.port()),
@@ -99,7 +99,7 @@ pub fn url(address: SocketAddr, auth: &RequestAuth) -> String {
     }
 }
 
-/// 128 random bits of the kernel.
+/// Random token of 128 bits from the kernel.
 fn random_token() -> std::io::Result<String> {
     let mut bytes = [0; 16];
     std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;

@@ -1,4 +1,4 @@
-//! All parameters of the viewer server.
+//! Parameters of the viewer.
 
 use super::bridge::{HeadsetReach, Reach};
 use super::offer::MAX_MESSAGE_BYTES;
@@ -32,7 +32,7 @@ const ABOUT: &[About] = about! {
 const WRITING: &str = "what clients may do is settled at the start";
 const SOCKET: &str = "the server is made with it";
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub viewer: ViewerOptions,
     pub limits: ComputeLimits,
@@ -65,7 +65,7 @@ impl Settings {
     }
 }
 
-/// Bounds of what clients may publish for a headset, if they may.
+/// Limits of headset messages from clients, if allowed.
 fn headset(params: &Params) -> Result<Option<HeadsetReach>, ParamError> {
     let allow = params.bool("allow_headset", false)?;
     let message_bytes = params.usize_in(
@@ -86,7 +86,7 @@ fn headset(params: &Params) -> Result<Option<HeadsetReach>, ParamError> {
     }))
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

@@ -1,4 +1,4 @@
-//! Room for connections that are no client yet: bounded in all, and for each address.
+//! Limit of connections that are not clients yet: in total, and per address.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, VecDeque};
@@ -9,18 +9,18 @@ use std::rc::Rc;
 use smol::channel::{Receiver, Sender, bounded};
 use smol::future::or;
 
-/// Most connections in a room.
+/// Limit of connections.
 pub const MAX_CONNECTIONS: usize = 64;
-/// Most of them from one address: two pages, each with the six connections that browsers open, and a few more.
+/// Limit per address: two pages, each with the six connections that browsers open, and a few more.
 pub const MAX_PER_ADDRESS: usize = 16;
 
-/// A room. Who comes when it is full takes the place of the oldest connection of the address that has most.
+/// Set of connections. Above a limit a new connection displaces the oldest of the address with the most.
 #[derive(Default)]
 pub struct Room(RefCell<Places>);
 
 #[derive(Default)]
 struct Places {
-    /// In the order in which they came.
+    /// Connections in the order of arrival.
     taken: VecDeque<Place>,
     next: u64,
     displaced: u64,
@@ -29,11 +29,11 @@ struct Places {
 struct Place {
     id: u64,
     address: IpAddr,
-    /// Ends the connection once it is dropped.
+    /// Dropping it ends the connection.
     _keep: Sender<()>,
 }
 
-/// A connection in a room, which it leaves when dropped.
+/// A connection in the set; dropping it removes it.
 pub struct Guest {
     room: Rc<Room>,
     id: u64,
@@ -41,7 +41,7 @@ pub struct Guest {
 }
 
 impl Room {
-    /// Takes a place, of another one where there is none.
+    /// Adds a connection, displacing another one if needed.
     pub fn enter(self: &Rc<Self>, from: IpAddr) -> Guest {
         let mut places = self.0.borrow_mut();
         let address = network(from);
@@ -77,14 +77,14 @@ impl Room {
         }
     }
 
-    /// Connections that gave way to newer ones since the last call.
+    /// Connections displaced since the last call.
     pub fn take_displaced(&self) -> u64 {
         std::mem::take(&mut self.0.borrow_mut().displaced)
     }
 }
 
 impl Guest {
-    /// Does the work while the connection has its place.
+    /// Runs the work until the connection is displaced.
     pub async fn served<T>(&self, work: impl Future<Output = io::Result<T>>) -> io::Result<T> {
         let displaced = async {
             let _ = self.displaced.recv().await;
@@ -101,7 +101,7 @@ impl Drop for Guest {
     }
 }
 
-/// An IPv4 address, or the first half of an IPv6 address, of which a host has as many as it likes.
+/// IPv4 address, or the /64 prefix of an IPv6 address, within which a host has many addresses.
 fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V4(address) => address.into(),

@@ -1,4 +1,4 @@
-//! The thread that takes connections, and its end.
+//! Server thread: accepts connections until it is finished.
 
 use std::io;
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
@@ -15,10 +15,10 @@ use super::broadcaster::Broadcaster;
 use super::connection::{self, Rooms};
 use super::http::RequestAuth;
 
-/// Time for clients to take the last messages.
+/// Time for clients to read the last messages.
 const LAST_TIME: Duration = Duration::from_secs(1);
 
-/// A server that is at work.
+/// A running server.
 pub struct Server {
     broadcaster: Arc<Broadcaster>,
     address: SocketAddr,
@@ -27,7 +27,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Listens on an address; one that is taken is an error that says so.
+    /// Listens on an address.
     pub fn start(
         address: SocketAddr,
         auth: RequestAuth,
@@ -65,12 +65,12 @@ impl Server {
         })
     }
 
-    /// Address it listens on.
+    /// Listening address.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Lets clients take what there is, for a second at most, and closes all connections.
+    /// Lets clients read queued messages, for at most a second, and closes all connections.
     pub fn finish(self) {
         let late = Instant::now() + LAST_TIME;
         while !self.broadcaster.is_drained() && Instant::now() < late {
@@ -95,9 +95,9 @@ async fn accept(
         let (stream, from) = match accepted(&listener).await {
             Ok(stream) => stream,
             Err(error) => {
-                // As when there are no descriptors: it may pass.
+                // Such as a lack of descriptors, which may pass.
                 if let Some(more) = warnings.check() {
-                    log::warn!("a connection was not taken: {error} ({more} more like it)");
+                    log::warn!("connection not accepted: {error} ({more} more like it)");
                 }
                 Timer::after(Duration::from_millis(100)).await;
                 continue;

@@ -1,4 +1,4 @@
-//! Topics besides the map, and their subscriptions, which are there while somebody wants them.
+//! Topics besides the map, subscribed to on demand.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,15 +22,15 @@ use super::options::ViewerOptions;
 use super::outbox::Class;
 use crate::compute::Inbox;
 
-/// Longest message that is passed on.
+/// Largest forwarded message, bytes.
 const MAX_MESSAGE_BYTES: usize = 8 << 20;
-/// Most frames whose fixed transforms are kept.
+/// Limit of frames with stored static transforms.
 const MAX_STATIC_FRAMES: usize = 10_000;
 
-/// A message of a channel that is not yet in CDR.
+/// Channel message before its serialization.
 pub type Unwritten = Box<dyn FnOnce() -> Result<Vec<u8>, CdrError> + Send>;
 
-/// Makes the subscription of a channel.
+/// Creates the subscription of a channel.
 type Subscribe = Box<dyn Fn() -> Result<Subscription, RuntimeError> + Send>;
 
 /// Event for the compute thread.
@@ -39,14 +39,14 @@ pub trait FromChannel: Send + 'static {
     fn message(channel: u32, message: Unwritten) -> Self;
 }
 
-/// Time of a subscription to a channel.
+/// Subscription policy of a channel.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum When {
-    /// Always: it is small, and who comes late must have it.
+    /// Always: small messages that late joiners need.
     Always,
-    /// While somebody wants it.
+    /// While a client subscribes.
     OnDemand,
-    /// The same, anew for each who comes: the publisher then sends all that there is again.
+    /// Renewed for each client, so that the publisher sends its latched messages again.
     EachAnew,
 }
 
@@ -58,10 +58,10 @@ struct Source {
     joined: u64,
 }
 
-/// The topics besides the map.
+/// Topics besides the map.
 pub struct Sources {
     sources: Vec<Source>,
-    /// Messages that found the inbox full or were too long.
+    /// Messages rejected by the inbox, or too long.
     pub lost: Arc<AtomicU64>,
 }
 
@@ -150,7 +150,7 @@ impl Sources {
         Ok(builder.sources)
     }
 
-    /// Makes and ends subscriptions as clients want them.
+    /// Creates and drops subscriptions by demand.
     pub fn adapt(&mut self, broadcaster: &Broadcaster) {
         for source in &mut self.sources {
             let Demand { clients, joined } = broadcaster.demand(source.channel);
@@ -175,12 +175,12 @@ impl Sources {
     }
 }
 
-/// All fixed transforms, of whatever publisher, as one message.
+/// Static transforms of all publishers as one message.
 #[derive(Default)]
 pub struct FixedTransforms(BTreeMap<String, TransformStamped>);
 
 impl FixedTransforms {
-    /// Adds those of a message; gives the message of all.
+    /// Adds the transforms of a message; returns the merged message.
     pub fn add(&mut self, message: &TFMessage) -> Result<Vec<u8>, CdrError> {
         for transform in &message.transforms {
             let child = &transform.child_frame_id;

@@ -1,4 +1,4 @@
-//! The part of HTTP that a page of fixed files and one WebSocket need, without I/O.
+//! HTTP subset for static files and one WebSocket, without I/O.
 
 mod files;
 mod head;

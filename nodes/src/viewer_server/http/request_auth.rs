@@ -1,4 +1,4 @@
-//! Decision about a request: a file of the page, a WebSocket, or a refusal.
+//! Authorization of a request: a file of the page, a WebSocket, or a rejection.
 
 use std::net::IpAddr;
 
@@ -8,61 +8,61 @@ use super::files;
 use super::head::Head;
 use crate::viewer_server::protocol::SUBPROTOCOLS;
 
-/// Cookie that holds the token once it has been given in an address.
+/// Cookie with the token after it was given in a URL.
 const COOKIE: &str = "lattice_token";
 
-/// Policy of the page: it loads its own files and nothing else.
+/// Content security policy: the page loads its own files only.
 const POLICY: &str = "default-src 'none'; script-src 'self'; worker-src 'self'; style-src 'self'; \
      connect-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; \
      frame-ancestors 'none'";
 
-/// Conditions on which a request is let in.
+/// Conditions for accepting a request.
 #[derive(Clone, Debug, Default)]
 pub struct RequestAuth {
-    /// Names by which this machine may be called, besides `localhost` and addresses.
+    /// Host names of this machine, besides `localhost` and addresses.
     pub hosts: Vec<String>,
-    /// Origins of pages from elsewhere that may connect, such as `https://viewer.example`.
+    /// Allowed cross-origin pages, such as `https://viewer.example`.
     pub origins: Vec<String>,
-    /// Secret that a request must know.
+    /// Required secret.
     pub token: Option<String>,
 }
 
-/// An answer that ends the connection.
+/// Response that ends the connection.
 #[derive(Debug, PartialEq)]
 pub struct Response {
-    /// Code and reason.
+    /// Status code and reason.
     pub status: &'static str,
     /// Media type of the body.
     pub media_type: &'static str,
-    /// Further header lines, each with its end.
+    /// Further header lines, each with its line end.
     pub headers: String,
     /// Body.
     pub body: &'static [u8],
 }
 
-/// Outcome of a request.
+/// Decision on a request.
 #[derive(Debug, PartialEq)]
 pub enum Decision {
-    /// An answer.
+    /// Send a response.
     Answer(Response),
-    /// A WebSocket, after these bytes.
+    /// Upgrade to a WebSocket, after sending this head.
     Upgrade(String),
 }
 
 impl RequestAuth {
-    /// Decides about a request.
+    /// Decides on a request.
     pub fn decide(&self, head: &Head) -> Decision {
         let Some(host) = head.host.as_deref().filter(|host| self.knows(host)) else {
-            let why = b"This host name is not served here: add it to `allowed_hosts`.\n";
+            let why = b"This host name is not allowed: add it to `allowed_hosts`.\n";
             return refuse("421 Misdirected Request", why);
         };
         if head.method != "GET" {
-            return refuse("405 Method Not Allowed", b"Only GET is answered.\n");
+            return refuse("405 Method Not Allowed", b"Only GET is supported.\n");
         }
         if let Some(origin) = &head.origin
             && !self.trusts(origin, host)
         {
-            let why = b"This origin may not connect: add it to `allowed_origins`.\n";
+            let why = b"This origin is not allowed: add it to `allowed_origins`.\n";
             return refuse("403 Forbidden", why);
         }
         if let Some(token) = &self.token {
@@ -88,8 +88,8 @@ impl RequestAuth {
         }
     }
 
-    /// True for the names of this machine. A name of somebody else's may be made to lead here; an
-    /// address may not.
+    /// True for host names of this machine, against DNS rebinding. A foreign name may resolve to this
+    /// machine; an address cannot.
     fn knows(&self, host: &str) -> bool {
         let name = host.rsplit_once(':').map_or(host, |(name, port)| {
             match port.bytes().all(|byte| byte.is_ascii_digit()) {
@@ -113,7 +113,7 @@ impl RequestAuth {
     }
 }
 
-/// Compares in a time that does not depend on where the texts differ.
+/// Compares in constant time.
 fn same(given: &str, token: &str) -> bool {
     let pairs = given.bytes().zip(token.bytes());
     let differences = pairs.fold(0, |all, (a, b)| all | (a ^ b));
@@ -129,7 +129,7 @@ fn refuse(status: &'static str, body: &'static [u8]) -> Decision {
     })
 }
 
-/// Puts the token into a cookie, and takes it from the address bar.
+/// Stores the token in a cookie, and removes it from the URL.
 fn keep_token(token: &str) -> Decision {
     Decision::Answer(Response {
         status: "303 See Other",
@@ -143,12 +143,12 @@ fn keep_token(token: &str) -> Decision {
 
 fn upgrade(head: &Head) -> Decision {
     let Some(key) = head.key.as_deref().filter(|key| key.len() == 24) else {
-        return refuse("400 Bad Request", b"There is no Sec-WebSocket-Key.\n");
+        return refuse("400 Bad Request", b"Sec-WebSocket-Key is missing.\n");
     };
     if head.version.as_deref() != Some("13") {
         return refuse(
             "426 Upgrade Required",
-            b"Only version 13 of WebSocket is spoken.\n",
+            b"Only WebSocket version 13 is supported.\n",
         );
     }
     let offered = |name: &&&str| head.protocols.iter().any(|offered| offered == **name);
@@ -164,27 +164,27 @@ fn upgrade(head: &Head) -> Decision {
 }
 
 impl Response {
-    /// The answer that there are too many clients.
+    /// Response at the client limit.
     pub fn full() -> Self {
         Self {
             status: "503 Service Unavailable",
             media_type: "text/plain; charset=utf-8",
             headers: "Retry-After: 5\r\n".to_owned(),
-            body: b"All places are taken: close another page, or raise `max_clients`.\n",
+            body: b"`max_clients` is reached: close another page, or raise it.\n",
         }
     }
 
-    /// The answer to what is no request.
+    /// Response to a malformed request.
     pub fn bad_request() -> Self {
         Self {
             status: "400 Bad Request",
             media_type: "text/plain; charset=utf-8",
             headers: String::new(),
-            body: b"This is no request of HTTP/1.1 with a head of at most 8 kB.\n",
+            body: b"Not an HTTP/1.1 request with a head of at most 8 kB.\n",
         }
     }
 
-    /// The bytes to send.
+    /// Serialized response.
     pub fn bytes(&self) -> Vec<u8> {
         let mut bytes = format!(
             "HTTP/1.1 {}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n\

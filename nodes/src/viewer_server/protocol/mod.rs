@@ -1,4 +1,4 @@
-//! The Foxglove WebSocket protocol, version 1, as far as it is needed here.
+//! The supported part of the Foxglove WebSocket protocol, version 1.
 
 mod client;
 mod server;
@@ -10,5 +10,5 @@ pub use server::{
     service_response, status,
 };
 
-/// Names of the protocol, the preferred one first: they differ in nothing that is used here.
+/// Subprotocol names, the preferred one first; they are equivalent for the supported part.
 pub const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
