@@ -10,13 +10,13 @@ use nalgebra::Vector3;
 pub const COMMON: &[About] = about! {
     "map_frame" fixed(FRAME): "Frame of the map (x east, y north, z up where it comes from an INS).";
     "threads" fixed("the pool is made with it"): "Threads of the compute pool; 0: one less than the machine has.";
-    "inbox_events" fixed(INBOX): "Most messages that wait for the compute thread.";
-    "inbox_bytes" fixed(INBOX): "Most bytes of messages that wait for the compute thread.";
+    "inbox_events" fixed(INBOX): "Limit of messages queued for the compute thread.";
+    "inbox_bytes" fixed(INBOX): "Limit of message bytes queued for the compute thread.";
     "report_file" fixed("it names an output"): "File for a report in JSON at the end; empty: none.";
-    "mapper" fixed("it names a topic"): "Node that is asked for a keyframe when a part of the map was lost.";
-    "label_low_16_bits": "Whether only the low 16 of labels of 32 bits are the class (SemanticKITTI: the others are the instance).";
-    "ignored_labels": "Classes that say nothing, as 0 in SemanticKITTI.";
-    "palette_rgb_class": "Classes of colours, for clouds whose labels are the colours semantic_color, semantic_color1 to 3 or rgb, and for images of colours: red, green, blue, class, and so on.";
+    "mapper" fixed("it names a topic"): "Node that receives keyframe requests after a loss of map messages.";
+    "label_low_16_bits": "Whether only the low 16 bits of 32-bit labels are the class (SemanticKITTI: the high bits are the instance).";
+    "ignored_labels": "Classes treated as unlabelled, such as 0 in SemanticKITTI.";
+    "palette_rgb_class": "Classes of colours, for clouds labelled by the colours semantic_color, semantic_color1 to 3 or rgb, and for colour masks: red, green, blue, class, and so on.";
 };
 
 /// Reason why frames are read-only.

@@ -15,22 +15,22 @@ use lattice_runtime::{Shutdown, about};
 
 const MODEL: &str = "the network is made at the start";
 const ABOUT: &[About] = about! {
-    "model" fixed(MODEL): "The network, an ONNX file: one image in (1 x 3 x rows x columns), scores of classes or classes out.";
+    "model" fixed(MODEL): "Network, an ONNX file: one image in (1 x 3 x rows x columns), scores of classes or classes out.";
     "compressed" fixed(options::TOPIC): "Whether images are taken from rgb/image_rect_color/compressed (JPEG).";
-    "max_image_pixels": "Images of more pixels are refused.";
+    "max_image_pixels": "Limit of pixels per image; larger images are rejected.";
 };
 
 /// Parameters of a network, in any node.
 pub(crate) const NETWORK: &[About] = about! {
     "model" fixed(MODEL): "A network that labels the images of colours inside this node, an ONNX file as segmenter takes it; empty: labels come from a topic.";
     "backend" fixed(MODEL): "What runs the network: tract, which is built in, or ort, the library of ONNX Runtime that ORT_DYLIB_PATH names (feature ort).";
-    "input_size" fixed(MODEL): "Width and height of the images that the network takes, where its file leaves them open.";
-    "mean": "Means of red, green and blue, for colours from 0 to 1, as the network was trained with.";
-    "std": "Standard deviations of red, green and blue, likewise.";
+    "input_size" fixed(MODEL): "Input width and height of the network, if dynamic in its file.";
+    "mean": "Means of red, green and blue, for colours from 0 to 1, as in the training of the network.";
+    "std": "Standard deviations of red, green and blue, as in the training of the network.";
     "scores": "Whether the scores of the network are logits or probabilities.";
-    "names": "Names of the classes in the order of their numbers; none: those of the model.";
+    "names": "Class names in the order of their numbers; none: those of the model.";
     "label_probs": "Whether points have label_probs, the probabilities of the four best classes of their pixel, with model.";
-    "compressed_color" fixed(options::TOPIC): "Whether images of colours are taken packed (JPEG), from the topic with /compressed behind its name.";
+    "compressed_color" fixed(options::TOPIC): "Whether colour images are compressed (JPEG), on the topic with the suffix /compressed.";
 };
 
 /// Timeout of loading a network, about as long as an operator waits for a node to start.

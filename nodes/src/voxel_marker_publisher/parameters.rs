@@ -10,16 +10,16 @@ use lattice_runtime::params::{About, ParamError, Params};
 use lattice_runtime::qos::Qos;
 
 const ABOUT: &[About] = about! {
-    "style": "cells (true cell shapes, exposed faces only), cubes or points.";
-    "color_by": "height (of each vertex) or flat (one colour a marker, 40 % fewer bytes).";
-    "height_period_m": "Heights between two equal hues.";
+    "style": "Marker style: cells (Voronoi cells, exposed faces only), cubes or points.";
+    "color_by": "Colour scheme: height (of each vertex) or flat (one colour per marker, 40 % fewer bytes).";
+    "height_period_m": "Height period of the hues.";
     "alpha": "Opacity.";
-    "block_bits": "Blocks are 2^block_bits lattice indices a side; a change republishes its whole block.";
+    "block_bits": "Block size: 2^block_bits lattice indices a side; a change republishes its whole block.";
     "chunk_bytes": "Largest message, bytes.";
-    "max_marker_voxels": "Maps of more voxels are drawn as points.";
-    "max_voxels": "Larger maps are not followed.";
-    "rate_hz": "How often changes are published.";
-    "max_bytes_per_s": "Most bytes a second that are published.";
+    "max_marker_voxels": "Voxel count above which maps are drawn as points.";
+    "max_voxels": "Voxel limit of the followed map.";
+    "rate_hz": "Rate of publishing changes.";
+    "max_bytes_per_s": "Limit of published bytes per second.";
 };
 
 /// Settings from the parameters of the node.

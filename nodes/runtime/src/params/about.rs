@@ -39,15 +39,15 @@ macro_rules! about {
 
 /// Parameters that every node has.
 pub(super) const OF_EVERY_NODE: &[About] = about! {
-    "max_message_bytes" fixed("subscriptions are made with it"): "Longer messages are not taken, bytes.";
-    "use_sim_time": "Whether the node goes by the time on /clock.";
+    "max_message_bytes" fixed("subscriptions are made with it"): "Largest message accepted, bytes.";
+    "use_sim_time": "Whether the node uses the time on /clock.";
     "managed" fixed("it is read at the start"):
-        "Whether the node waits to be configured and activated, as ros2 lifecycle does it.";
+        "Whether the node is a lifecycle node, which waits to be configured and activated (ros2 lifecycle).";
     "start_type_description_service" fixed("the service is made at the start"):
         "Whether ~/get_type_description is served.";
-    "*.reliability" fixed(QOS): "Whether samples of the topic that were lost are sent again.";
-    "*.durability" fixed(QOS): "Whether who joins the topic late gets the last samples.";
-    "*.depth" fixed(QOS): "Samples of the topic that are kept.";
+    "*.reliability" fixed(QOS): "Reliability of the topic: reliable (lost samples are resent) or best_effort.";
+    "*.durability" fixed(QOS): "Durability of the topic: transient_local (late joiners receive the last samples) or volatile.";
+    "*.depth" fixed(QOS): "History depth of the topic, samples.";
 };
 
 const QOS: &str = "endpoints are made with it";
