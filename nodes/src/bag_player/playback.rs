@@ -134,7 +134,7 @@ impl Playback {
                 self.publish(topic, data);
             }
             Step::Clock(now_ns) => self.publish_clock(now_ns),
-            Step::Looped => log::info!("the log starts again"),
+            Step::Looped => log::info!("the log restarts"),
             Step::End => return Ok(false),
         }
         Ok(true)
@@ -155,7 +155,7 @@ impl Playback {
                 }
             }
         }
-        log::info!("{}", if held { "paused" } else { "goes on" });
+        log::info!("{}", if held { "paused" } else { "resumed" });
     }
 
     pub(super) fn toggle(&mut self) {
@@ -291,8 +291,8 @@ impl Playback {
         }
     }
 
-    /// Publishes a message, in lockstep when the one before is answered; a subscriber that does not acknowledge is
-    /// waited for once.
+    /// Publishes a message, in lockstep after the reply to the one before; waits once for a subscriber that
+    /// does not acknowledge.
     fn publish(&mut self, topic: usize, data: Vec<u8>) {
         let begin = Instant::now();
         let (mut lockstep, patience) = (mem::take(&mut self.lockstep), self.most_wait);
@@ -312,7 +312,7 @@ impl Playback {
                 log::warn!("{error}; skipped until its subscribers acknowledge");
             }
         } else if *stuck {
-            log::info!("{}: goes on", publisher.topic());
+            log::info!("{}: continues", publisher.topic());
         }
         *stuck = published.is_err();
     }

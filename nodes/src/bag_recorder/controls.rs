@@ -19,7 +19,7 @@ pub(super) fn serve(session: &Session) -> Result<Vec<Server>, RuntimeError> {
         let paused = Arc::clone(paused);
         move || {
             if paused.swap(hold, Relaxed) != hold {
-                log::info!("{}", if hold { "paused" } else { "goes on" });
+                log::info!("{}", if hold { "paused" } else { "resumed" });
             }
         }
     };

@@ -64,21 +64,21 @@ pub struct Scores {
 /// Reason why a model cannot be used.
 #[derive(Debug, Error)]
 pub enum ModelError {
-    /// The program does not have the backend.
+    /// The backend is not built in.
     #[error("this program was built without the feature `{0}`: build it with `--features {0}`")]
     NotBuilt(&'static str),
-    /// The library of ONNX Runtime cannot be used.
+    /// The ONNX Runtime library is unusable.
     #[error("ONNX Runtime: {0}")]
     Library(String),
-    /// The file cannot be read.
+    /// The file is unreadable.
     #[error("{}: {error}", path.display())]
     File {
         /// Its path.
         path: PathBuf,
-        /// Why not.
+        /// Error of the system.
         error: std::io::Error,
     },
-    /// More bytes than are read.
+    /// File size above the limit.
     #[error("{}: {bytes} bytes, more than {max}", path.display())]
     Large {
         /// Its path.
@@ -88,26 +88,26 @@ pub enum ModelError {
         /// The limit.
         max: u64,
     },
-    /// It is no model, or one that asks for what is not offered.
+    /// Not a model, or an unsupported one.
     #[error("{}: {problem}", path.display())]
     Unusable {
         /// Path of the model.
         path: PathBuf,
-        /// What is wrong with it.
+        /// What is wrong.
         problem: String,
     },
 }
 
 /// A network that labels images.
 pub trait Network: Send {
-    /// Size of the images that it takes.
+    /// Input size.
     fn input(&self) -> Size;
 
-    /// Names of its classes by their numbers; empty if it does not say.
+    /// Class names by their numbers; empty if unknown.
     fn names(&self) -> &[String];
 
-    /// Output for an image: red, green and blue planes of the size of the input, normalised.
+    /// Output for an image: red, green and blue planes of the input size, normalised.
     ///
-    /// Errors: the network cannot be run, or its output is of another kind than it says.
+    /// Errors: inference fails, or the output differs from its declaration.
     fn run(&self, planes: Vec<f32>) -> Result<Scores, String>;
 }

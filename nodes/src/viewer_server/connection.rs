@@ -1,4 +1,4 @@
-//! One connection: its request, then nothing more or a WebSocket.
+//! One connection: its request, then a response or a WebSocket.
 
 use std::io;
 use std::net::{IpAddr, TcpStream};
@@ -27,11 +27,11 @@ use super::protocol::message_data;
 use super::room::Room;
 use super::stream::{ClientStream, Progress};
 
-/// Time for a request to come.
+/// Timeout of receiving a request.
 const HEAD_TIME: Duration = Duration::from_secs(5);
-/// Time for a file of the page, or a refusal, to be taken.
+/// Timeout of sending a response.
 const ANSWER_TIME: Duration = Duration::from_secs(20);
-/// Time for the reason of an end to be taken.
+/// Timeout of sending the close reason.
 const LAST_TIME: Duration = Duration::from_secs(1);
 /// Socket send buffer, bytes.
 const SEND_BUFFER_BYTES: usize = 512 << 10;

@@ -8,41 +8,41 @@ use crate::sync::lock;
 /// Longest accepted value, characters or items.
 const MAX_VALUE_LENGTH: usize = 1 << 16;
 
-/// Takes all parameters as they would be, or says why not; nothing changes then.
+/// Validates all candidate values, or returns the reason against them; then nothing changes.
 type Apply = Box<dyn FnMut(&Params) -> Result<(), String> + Send>;
 
-/// Hears of parameters that are new, and of those that have changed.
+/// Receives new and changed parameters.
 type Listener = Box<dyn FnMut(Values, Values) + Send>;
 
 /// Parameters by name.
 pub(crate) type Values = BTreeMap<String, ParamValue>;
 
-/// Those who take part in a change; one change at a time.
+/// Participants of a parameter change; one change at a time.
 #[derive(Default)]
 pub(super) struct Changes {
-    /// The node; none: it is not at work.
+    /// Callback of the node; `None`: it is not running.
     node: Option<Apply>,
     apply: Vec<Apply>,
     is_open: bool,
     listener: Option<Listener>,
 }
 
-/// Error of a change that is refused.
+/// Reason for rejecting a change.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Refusal {
-    /// No such parameter.
+    /// Undeclared parameter.
     #[error("parameter '{0}' cannot be set because it was not declared")]
     NotDeclared(String),
-    /// All else.
+    /// Any other reason.
     #[error("{0}")]
     Other(String),
 }
 
 impl Params {
-    /// Lets parameters be changed from now on, and tells listeners which there are.
+    /// Makes parameters settable, and notifies listeners of the declared ones.
     ///
-    /// `apply` is given all parameters as they would be: it reads its options as at the start, and hands
-    /// them to the node or says why not. It must return at once.
+    /// `apply` receives all candidate values: it parses its options as at the start, and passes
+    /// them to the node or returns the reason against them. It must return at once.
     pub fn open(&self, apply: impl FnMut(&Params) -> Result<(), String> + Send + 'static) {
         let mut changes = lock(&self.changes);
         changes.node = Some(Box::new(apply));
@@ -51,16 +51,16 @@ impl Params {
         self.tell_new();
     }
 
-    /// Lets nothing be changed any more, since the node is not at work.
+    /// Makes parameters read-only, since the node is not running.
     pub fn close(&self) {
         let mut changes = lock(&self.changes);
         changes.is_open = false;
         let node = changes.node.take();
-        // What the node handed over may end with it.
+        // Dropped outside the locks: values captured by the node may end with it.
         drop((changes, node));
     }
 
-    /// One more who is asked; the first says last.
+    /// Adds a further callback; the first one is called last.
     pub(crate) fn also_apply(
         &self,
         apply: impl FnMut(&Params) -> Result<(), String> + Send + 'static,
@@ -68,7 +68,7 @@ impl Params {
         lock(&self.changes).apply.insert(0, Box::new(apply));
     }
 
-    /// Sets who hears of changes, and tells it which parameters there are by now.
+    /// Sets the listener of changes, and notifies it of the declared parameters.
     pub(crate) fn listen(&self, listener: impl FnMut(Values, Values) + Send + 'static) {
         lock(&self.changes).listener = Some(Box::new(listener));
         self.tell_new();
@@ -90,7 +90,7 @@ impl Params {
         }
     }
 
-    /// Takes note of a value that the node has changed itself.
+    /// Records a value that the node has changed itself.
     pub fn note(&self, name: &str, value: ParamValue) {
         let mut changes = lock(&self.changes);
         let mut state = lock(&self.state);
@@ -104,7 +104,7 @@ impl Params {
         changes.tell(Values::new(), [(name.to_owned(), value)].into());
     }
 
-    /// Changes all of these, or none; `None` stands for a value that is to go.
+    /// Changes all of these parameters, or none; `None` removes a value.
     pub(crate) fn set(&self, wanted: Vec<(String, Option<ParamValue>)>) -> Result<(), Refusal> {
         let mut changes = lock(&self.changes);
         let values = lock(&self.state).check(wanted)?;
