@@ -54,7 +54,7 @@ pub enum BagError {
         reason: String,
     },
     /// `metadata.yaml` or a link refers to a path outside the bag.
-    #[error("{}: {entry:?} leads out of the bag folder; such a bag is refused: correct the entry, or put the file in place of the link", path.display())]
+    #[error("{}: {entry:?} is outside the bag folder: correct the entry, or replace the link by the file", path.display())]
     PathTraversal { path: PathBuf, entry: String },
     /// Size above a limit.
     #[error("{}: {what} at {position} takes {size_bytes} bytes, more than the limit of {limit_bytes}; {remedy}", path.display())]

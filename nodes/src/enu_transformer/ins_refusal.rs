@@ -49,7 +49,7 @@ pub enum InsRefusal {
     },
     /// Accepted jump to another place.
     #[error(
-        "position jumped by {distance_m:.1} m in {time_s:.3} s and stayed there: the map goes on there, beside what it has"
+        "position jumped by {distance_m:.1} m in {time_s:.3} s and stayed there: the map continues there, beside its earlier part"
     )]
     Jump { distance_m: f64, time_s: f64 },
     /// Invalid pose.

@@ -143,7 +143,7 @@ impl EnuTransformer {
         ) {
             self.has_warned_reference = true;
             log::warn!(
-                "a transform {map} <- {frame} is published now; poses are taken in {frame} as before: start again to map in {map}, or set map_frame: {frame}"
+                "a transform {map} <- {frame} is published now; poses remain in {frame}: restart to map in {map}, or set map_frame: {frame}"
             );
         }
     }

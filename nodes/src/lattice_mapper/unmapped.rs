@@ -73,7 +73,7 @@ mod tests {
         unmapped.last_refusal = Some("cloud in frame 'velodyne'".to_owned());
         let refused = says(&unmapped, &counts);
         assert!(
-            refused.ends_with("refused: cloud in frame 'velodyne'"),
+            refused.ends_with("rejected: cloud in frame 'velodyne'"),
             "{refused}"
         );
     }

@@ -136,7 +136,7 @@ impl SqliteFile {
         let definitions = self
             .definitions(connection, &tables)
             .unwrap_or_else(|error| {
-                log::warn!("{error}; its topics are taken without definitions");
+                log::warn!("{error}; its topics have no definitions");
                 BTreeMap::new()
             });
         let wrong = |e| BagError::sqlite(&self.path, "table topics", e);
