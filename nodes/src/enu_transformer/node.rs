@@ -51,7 +51,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let source = settings.transformer.ins.source;
     let [lost, lost_poses] = [(); 2].map(|()| Arc::new(AtomicU64::new(0)));
     let (lost_clouds, losses) = (Losses::default(), Losses::default());
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         lost_clouds: lost_clouds.clone(),
         losses: losses.clone(),
         machine: EnuTransformer::new(settings.transformer),
@@ -70,7 +70,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         name,
         settings.limits,
         runtime.shutdown_handle(),
-        move |event| shell.on(event),
+        move |event| compute_state.on(event),
     )?;
     let inbox = compute.inbox();
     let mut clouds = Vec::new();
@@ -203,7 +203,7 @@ struct InsTopics {
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     machine: EnuTransformer,
     outputs: Outputs,
     clock: Clock,
@@ -219,7 +219,7 @@ struct Shell {
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         let now_ns = self.clock.now_ns();
         let machine = &mut self.machine;

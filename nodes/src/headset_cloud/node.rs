@@ -75,7 +75,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         None => None,
     };
     let (lost, losses) = (Arc::new(AtomicU64::new(0)), Losses::default());
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         machine,
         points: node.publisher("headset/points", Qos::SCANS)?,
         label_info: node.publisher("headset/label_info", Qos::LATCHED)?,
@@ -89,10 +89,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         warned: 0,
         report_file: settings.report_file.clone(),
     };
-    shell.tell_names();
+    compute_state.publish_names();
     let shutdown = runtime.shutdown_handle();
     let compute = Compute::spawn(name, settings.limits, shutdown.clone(), move |event| {
-        shell.on(event)
+        compute_state.on(event)
     })?;
     let inbox = compute.inbox();
     let mut inputs = subscribe(&node, &inbox, &lost, &settings)?;
@@ -225,7 +225,7 @@ fn subscribe(
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     machine: HeadsetCloud,
     points: Publisher<PointCloud2>,
     label_info: Publisher<LabelInfo>,
@@ -243,7 +243,7 @@ struct Shell {
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         let machine = &mut self.machine;
         let elapsed = self.begin.elapsed().as_nanos();
@@ -264,7 +264,7 @@ impl Shell {
             // Poses are kept longer than the processing of an image.
             Event::Network(NetworkEvent::Begun(_)) => return,
             Event::Network(NetworkEvent::Names) => {
-                self.tell_names();
+                self.publish_names();
                 return;
             }
             Event::Settings(options) => machine.set_options(*options),
@@ -284,7 +284,7 @@ impl Shell {
     }
 
     /// Publishes the class names of the built-in network.
-    fn tell_names(&mut self) {
+    fn publish_names(&mut self) {
         let info = self.network.as_ref().and_then(NetworkView::label_info);
         if let Some(info) = info {
             let outputs = self.machine.on_label_info(Arc::new(info));

@@ -62,7 +62,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         runtime.shutdown_handle(),
     )?;
     let autosave_period = autosave.period;
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         machine,
         autosave,
         output,
@@ -80,12 +80,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         centers_of: None,
         report_file: settings.report_file,
     };
-    let centers = shell.outputs.centers.clone();
+    let centers = compute_state.outputs.centers.clone();
     let compute = Compute::spawn(
         name,
         settings.limits,
         runtime.shutdown_handle(),
-        move |event| shell.on(event),
+        move |event| compute_state.on(event),
     )?;
     let inbox = compute.inbox();
     let hand_over = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
@@ -179,7 +179,7 @@ fn notify(inbox: &Inbox<Event>, event: Event) {
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     machine: LatticeMapper,
     autosave: Autosave,
     output: MapOutput,
@@ -204,7 +204,7 @@ struct Shell {
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Cloud(cloud) => {

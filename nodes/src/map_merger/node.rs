@@ -59,7 +59,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         let mapper = format!("/{robot}/{}", settings.mapper);
         MapRequests::new(&node, &mapper, losses)
     };
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         inputs: robots
             .iter()
             .zip(&losses)
@@ -76,7 +76,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         name,
         settings.limits,
         runtime.shutdown_handle(),
-        move |event| shell.on(event),
+        move |event| compute_state.on(event),
     )?;
     let inbox = compute.inbox();
     let mut subscriptions: Vec<[Subscription; 2]> = Vec::new();
@@ -121,7 +121,7 @@ fn names(node: &Node, options: &MergerOptions) -> Result<Publisher<LabelInfo>, N
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     inputs: Vec<MapRequests>,
     machine: MapMerger,
     robots: Vec<String>,
@@ -131,7 +131,7 @@ struct Shell {
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Map(robot, chunk) => {

@@ -36,7 +36,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     };
     let network = network.read(params, &runtime.shutdown_handle())?;
     let (slot, losses) = (Arc::new(Slot::default()), Losses::default());
-    let shell = Shell {
+    let compute_state = ComputeState {
         machine: Segmenter::new(settings.segmenter, network),
         slot: Arc::clone(&slot),
         labels: node.publisher("labels/image", Qos::SCANS)?,
@@ -49,11 +49,11 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         warned: 0,
         report_file: settings.report_file,
     };
-    shell.tell_names();
-    let mut shell = shell;
+    compute_state.publish_names();
+    let mut compute_state = compute_state;
     let shutdown = runtime.shutdown_handle();
     let compute = Compute::spawn(name, settings.limits, shutdown, move |event| {
-        shell.on(event)
+        compute_state.on(event)
     })?;
     let inbox = compute.inbox();
     let wake = inbox.clone();
@@ -81,7 +81,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     machine: Segmenter,
     slot: Arc<Slot>,
     labels: Publisher<Image>,
@@ -97,13 +97,13 @@ struct Shell {
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Image => self.label(),
             Event::Settings(options) => {
                 self.machine.set_options(*options);
-                self.tell_names();
+                self.publish_names();
             }
             Event::Diagnose => self.diagnose(),
             Event::Finish => {
@@ -136,7 +136,7 @@ impl Shell {
         }
     }
 
-    fn tell_names(&self) {
+    fn publish_names(&self) {
         if let Some(info) = self.machine.label_info()
             && let Err(error) = self.label_info.publish(Arc::new(info))
         {

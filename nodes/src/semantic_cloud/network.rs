@@ -42,7 +42,7 @@ impl Outputs {
     }
 
     /// Publishes and returns the class names; `None` if there are none.
-    pub fn tell_names(&self) -> Option<Arc<LabelInfo>> {
+    pub fn publish_names(&self) -> Option<Arc<LabelInfo>> {
         let info = Arc::new(self.view.label_info()?);
         if let Err(error) = self.label_info.publish(Arc::clone(&info)) {
             log::debug!("not published: {error}");

@@ -57,7 +57,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         None => None,
     };
     let view = ready.as_ref().map(LoadedNetwork::view);
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         machine: SemanticCloud::new(settings.cloud.clone()),
         points: node.publisher("points", Qos::SCANS)?,
         label_info: node.publisher("label_info", Qos::LATCHED)?,
@@ -71,10 +71,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         warned: 0,
         report_file: settings.report_file.clone(),
     };
-    shell.tell_names();
+    compute_state.publish_names();
     let shutdown = runtime.shutdown_handle();
     let compute = Compute::spawn(name, settings.limits, shutdown.clone(), move |event| {
-        shell.on(event)
+        compute_state.on(event)
     })?;
     let inbox = compute.inbox();
     let mut inputs = subscribe(&node, &inbox, &lost, &settings)?;
@@ -190,7 +190,7 @@ fn subscribe(
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     machine: SemanticCloud,
     points: Publisher<PointCloud2>,
     label_info: Publisher<LabelInfo>,
@@ -209,7 +209,7 @@ struct Shell {
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         let outputs = match event {
             Event::Image(stream, image, at) => {
@@ -231,7 +231,7 @@ impl Shell {
                 self.machine.on_labelled(labels)
             }
             Event::Network(NetworkEvent::Names) => {
-                self.tell_names();
+                self.publish_names();
                 return;
             }
             Event::CameraInfo(info) => self.machine.on_camera_info(info),
@@ -259,8 +259,8 @@ impl Shell {
     }
 
     /// Publishes the class names of the built-in network.
-    fn tell_names(&mut self) {
-        let info = self.network.as_ref().and_then(Outputs::tell_names);
+    fn publish_names(&mut self) {
+        let info = self.network.as_ref().and_then(Outputs::publish_names);
         if let Some(info) = info {
             let outputs = self.machine.on_label_info(info);
             self.publish(outputs);

@@ -68,7 +68,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let lost = Arc::new(AtomicU64::new(0));
     let map_lost = Arc::new(AtomicBool::new(false));
     let losses = Losses::default();
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         losses: losses.clone(),
         machine: SemanticIcpServer::new(server),
         search: None,
@@ -84,7 +84,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         report_file,
     };
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
-        shell.on(event)
+        compute_state.on(event)
     })?;
     let inbox = compute.inbox();
     let wake = inbox.clone();
@@ -191,7 +191,7 @@ enum Client {
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     machine: SemanticIcpServer,
     search: Option<SearchPort>,
     outputs: Outputs,
@@ -210,7 +210,7 @@ struct Shell {
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         let now_ns = self.clock.now_ns();
         let outputs = match event {

@@ -73,7 +73,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let waiting = Arc::new(Waiting::new(limits.events, limits.bytes));
     let auth = viewer.request_auth()?;
     let losses = MapLosses::default();
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         node: node.clone(),
         broadcaster: Arc::clone(&broadcaster),
         source: MapSource::new(viewer.max_voxels),
@@ -90,10 +90,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     // Received by the compute thread's handler at its first event.
     let (give, take) = crossbeam_channel::bounded(1);
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
-        if shell.parts.is_none() {
-            shell.parts = take.recv().ok();
+        if compute_state.parts.is_none() {
+            compute_state.parts = take.recv().ok();
         }
-        shell.on(event)
+        compute_state.on(event)
     })?;
     let inbox = compute.inbox();
     let hand_over = hand_over(&inbox, waiting);
@@ -170,7 +170,7 @@ fn tell_address(url: &str, has_token: bool) {
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     node: Node,
     broadcaster: Arc<Broadcaster>,
     source: MapSource,
@@ -185,7 +185,7 @@ struct Shell {
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Map(chunk) => {

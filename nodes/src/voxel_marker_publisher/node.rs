@@ -40,7 +40,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let settings = Settings::from_params(params)?;
     let publisher = node.lossless_publisher("voxel_markers", Qos::MARKERS)?;
     let losses = MapLosses::default();
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         input: MapRequests::new(&node, &settings.mapper, &losses)?,
         machine: VoxelMarkers::new(settings.markers),
         markers: publisher.clone(),
@@ -54,7 +54,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         name,
         settings.limits,
         runtime.shutdown_handle(),
-        move |event| shell.on(event),
+        move |event| compute_state.on(event),
     )?;
     let inbox = compute.inbox();
     let subscriptions = losses.subscribe(&node, &inbox, Event::Map, Event::Update)?;
@@ -81,7 +81,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     input: MapRequests,
     machine: VoxelMarkers,
     markers: Publisher<MarkerArray>,
@@ -93,7 +93,7 @@ struct Shell {
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Map(chunk) => {
