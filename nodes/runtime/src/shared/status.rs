@@ -63,7 +63,7 @@ const QOS: &str = "QoS does not match";
 pub(super) const MAX_LOSSES: usize = 1000;
 
 /// A problem between this process and another.
-struct Trouble {
+struct TransportProblem {
     /// Topic or service, and the kind of problem.
     of: String,
     count: u64,
@@ -71,7 +71,7 @@ struct Trouble {
     problem: &'static str,
 }
 
-impl Trouble {
+impl TransportProblem {
     /// `None` if the count is zero.
     fn of(topic: &str, what: &str, count: u64, problem: &'static str) -> Option<Self> {
         (count > 0).then(|| Self {
@@ -83,7 +83,7 @@ impl Trouble {
 }
 
 /// Lost and undecodable messages of a subscription.
-fn not_had(topic: &str, stats: &Stats) -> Vec<Trouble> {
+fn not_had(topic: &str, stats: &Stats) -> Vec<TransportProblem> {
     let ReaderLosses {
         on_network,
         overrun,
@@ -93,8 +93,9 @@ fn not_had(topic: &str, stats: &Stats) -> Vec<Trouble> {
         ("lost_on_network", on_network, "messages lost"),
         ("overrun", overrun, "messages lost"),
     ];
-    let troubles =
-        counts.map(|(what, count, problem)| Trouble::of(topic, what, count.load(Relaxed), problem));
+    let troubles = counts.map(|(what, count, problem)| {
+        TransportProblem::of(topic, what, count.load(Relaxed), problem)
+    });
     troubles.into_iter().flatten().collect()
 }
 
@@ -138,7 +139,7 @@ impl Shared {
         lock(&self.losses).clone().into_iter().collect()
     }
 
-    fn note_losses(&self, troubles: &[Trouble]) {
+    fn note_losses(&self, troubles: &[TransportProblem]) {
         let mut losses = lock(&self.losses);
         for trouble in troubles.iter().filter(|trouble| trouble.problem != QOS) {
             if losses.len() < MAX_LOSSES || losses.contains_key(&trouble.of) {
@@ -149,14 +150,19 @@ impl Shared {
     }
 
     /// All losses and incompatibilities, with their counts.
-    fn troubles(&self) -> Vec<Trouble> {
+    fn troubles(&self) -> Vec<TransportProblem> {
         let mut troubles = Vec::new();
         for publisher in self.publishers() {
             let topic = publisher.peers.topic();
             let dropped = publisher.writer.dropped();
-            troubles.extend(Trouble::of(topic, "dropped", dropped, "messages dropped"));
+            troubles.extend(TransportProblem::of(
+                topic,
+                "dropped",
+                dropped,
+                "messages dropped",
+            ));
             let incompatible = publisher.peers.incompatible_count() as u64;
-            troubles.extend(Trouble::of(
+            troubles.extend(TransportProblem::of(
                 topic,
                 "incompatible_subscribers",
                 incompatible,
@@ -167,7 +173,7 @@ impl Shared {
             let topic = &intake.topic;
             troubles.extend(not_had(topic, &intake.stats));
             let incompatible = intake.peers.incompatible_count() as u64;
-            troubles.extend(Trouble::of(
+            troubles.extend(TransportProblem::of(
                 topic,
                 "incompatible_publishers",
                 incompatible,
@@ -177,8 +183,18 @@ impl Shared {
         const REQUESTS: &str = "requests not answered";
         for of in self.unanswered() {
             let (lost, failed) = (of.lost.load(Relaxed), of.failed.load(Relaxed));
-            troubles.extend(Trouble::of(&of.name, "requests_lost", lost, REQUESTS));
-            troubles.extend(Trouble::of(&of.name, "requests_failed", failed, REQUESTS));
+            troubles.extend(TransportProblem::of(
+                &of.name,
+                "requests_lost",
+                lost,
+                REQUESTS,
+            ));
+            troubles.extend(TransportProblem::of(
+                &of.name,
+                "requests_failed",
+                failed,
+                REQUESTS,
+            ));
         }
         troubles
     }
