@@ -1,12 +1,12 @@
 //! Service servers for clients of any rmw, and calls of our own clients.
 
-mod asking;
 mod local;
+mod remote_calls;
 mod serving;
 mod wire;
 
-pub(crate) use asking::{Asking, Waiting};
 pub(crate) use local::{LocalCall, LocalServices};
+pub(crate) use remote_calls::{PendingCalls, RemoteCalls};
 pub(crate) use serving::Serving;
 
 use std::sync::atomic::AtomicU64;

@@ -49,19 +49,19 @@ pub(crate) struct Serving {
 }
 
 /// A request in progress.
-struct Asked<R> {
+struct PendingRequest<R> {
     answered: Receiver<R>,
-    client: Asker,
+    client: Requester,
 }
 
 /// Sender of a request.
-enum Asker {
+enum Requester {
     Remote { reply_to: ReplyTo, id: EndpointId },
     Local(Sender<Result<Vec<u8>, String>>),
 }
 
 /// Next event of a server.
-enum Step {
+enum ServerEvent {
     Take(Result<Origin, String>),
     TakeLocal(LocalCall),
     Answered(Result<(), String>),
@@ -81,7 +81,7 @@ impl Serving {
             let take = async {
                 match takes {
                     true => {
-                        let remote = async { Step::Take(self.requests.next().await) };
+                        let remote = async { ServerEvent::Take(self.requests.next().await) };
                         or(self.next_local(), remote).await
                     }
                     false => future::pending().await,
@@ -89,30 +89,30 @@ impl Serving {
             };
             let answered = async {
                 match pending.next().await {
-                    Some(result) => Step::Answered(result),
+                    Some(result) => ServerEvent::Answered(result),
                     None => future::pending().await,
                 }
             };
             let end = async {
                 match self.ending.recv().await {
-                    Ok(done) => Step::End(done),
+                    Ok(done) => ServerEvent::End(done),
                     Err(_) => future::pending().await,
                 }
             };
             let outcome = match or(end, or(answered, take)).await {
-                Step::Take(sample) => {
+                ServerEvent::Take(sample) => {
                     self.count_lost();
                     self.ask::<S>(sample, &mut handler)
                         .map(|asked| pending.push(self.answer(asked)))
                 }
-                Step::TakeLocal(call) => {
+                ServerEvent::TakeLocal(call) => {
                     pending.extend(
                         ask_locally::<S>(call, &mut handler).map(|asked| self.answer(asked)),
                     );
                     Ok(())
                 }
-                Step::Answered(result) => result,
-                Step::End(done) => {
+                ServerEvent::Answered(result) => result,
+                ServerEvent::End(done) => {
                     ended = Some(done);
                     Ok(())
                 }
@@ -125,9 +125,9 @@ impl Serving {
         }
     }
 
-    async fn next_local(&self) -> Step {
+    async fn next_local(&self) -> ServerEvent {
         match self.local.recv().await {
-            Ok(call) => Step::TakeLocal(call),
+            Ok(call) => ServerEvent::TakeLocal(call),
             // Another server has taken the name.
             Err(_) => future::pending().await,
         }
@@ -155,7 +155,7 @@ impl Serving {
         &self,
         sample: Result<Origin, String>,
         handler: &mut impl FnMut(S::Request, Reply<S::Response>),
-    ) -> Result<Asked<S::Response>, String> {
+    ) -> Result<PendingRequest<S::Response>, String> {
         let origin = sample?;
         let (request, reply_to) =
             read_request::<S::Request>(self.form, &self.requests.bytes(), &origin)
@@ -163,16 +163,16 @@ impl Serving {
         let (reply, answered) = Reply::channel();
         handler(request, reply);
         let id = origin.sample.writer;
-        let client = Asker::Remote { reply_to, id };
-        Ok(Asked { answered, client })
+        let client = Requester::Remote { reply_to, id };
+        Ok(PendingRequest { answered, client })
     }
 
-    async fn answer<R: RosMessage>(&self, asked: Asked<R>) -> Result<(), String> {
+    async fn answer<R: RosMessage>(&self, asked: PendingRequest<R>) -> Result<(), String> {
         let answer = asked.answered.recv().await;
         let reply = answer.map_err(|_| "no reply was sent".to_owned());
         let (reply_to, id) = match asked.client {
-            Asker::Remote { reply_to, id } => (reply_to, id),
-            Asker::Local(to) => {
+            Requester::Remote { reply_to, id } => (reply_to, id),
+            Requester::Local(to) => {
                 let written = |reply| cdr::to_vec(&reply).map_err(|e| e.to_string());
                 // The caller may have stopped waiting.
                 let _ = to.try_send(reply.and_then(written));
@@ -217,13 +217,13 @@ impl Serving {
 fn ask_locally<S: RosService>(
     call: LocalCall,
     handler: &mut impl FnMut(S::Request, Reply<S::Response>),
-) -> Option<Asked<S::Response>> {
-    let client = Asker::Local(call.answered.clone());
+) -> Option<PendingRequest<S::Response>> {
+    let client = Requester::Local(call.answered.clone());
     match cdr::from_slice(&call.request) {
         Ok(request) => {
             let (reply, answered) = Reply::channel();
             handler(request, reply);
-            Some(Asked { answered, client })
+            Some(PendingRequest { answered, client })
         }
         Err(error) => {
             let _ = call.answered.try_send(Err(error.to_string()));

@@ -100,7 +100,7 @@ fn identity_there(server: &EndpointId, number: i64) -> Header {
 }
 
 /// Outgoing request in the format of its server.
-pub(crate) struct Asked {
+pub(crate) struct OutgoingRequest {
     /// Identity of the request in its reply.
     pub identity: Header,
     pub body: Bytes,
@@ -115,7 +115,7 @@ pub(crate) fn write_request(
     writer: &EndpointId,
     server: &EndpointId,
     number: i64,
-) -> Option<Asked> {
+) -> Option<OutgoingRequest> {
     let (encapsulation, body) = message.split_first_chunk::<ENCAPSULATION_BYTES>()?;
     if !encapsulation.starts_with(&[0, 1]) {
         return None;
@@ -124,7 +124,7 @@ pub(crate) fn write_request(
         // The server returns it unchanged.
         let identity = header(writer, number);
         let writer = EndpointId(identity);
-        return Some(Asked {
+        return Some(OutgoingRequest {
             identity,
             body: Bytes::copy_from_slice(body),
             related: Some(SampleId { writer, number }),
@@ -133,14 +133,14 @@ pub(crate) fn write_request(
     if server.vendor() == FASTDDS_VENDOR {
         let identity = identity_there(server, number);
         let writer = EndpointId(identity);
-        return Some(Asked {
+        return Some(OutgoingRequest {
             identity,
             body: Bytes::copy_from_slice(body),
             related: Some(SampleId { writer, number: 0 }),
         });
     }
     let identity = header(writer, number);
-    Some(Asked {
+    Some(OutgoingRequest {
         identity,
         body: [identity.as_slice(), body].concat().into(),
         related: None,

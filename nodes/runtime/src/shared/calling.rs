@@ -17,7 +17,7 @@ use crate::outbox::WhenFull;
 use crate::peers::Peers;
 use crate::port::{ClientEnds, EndpointKind, PortService, SampleReader, ServiceQos};
 use crate::qos::Qos;
-use crate::service::{Asking, LocalCall, Waiting};
+use crate::service::{LocalCall, PendingCalls, RemoteCalls};
 use crate::sync::lock;
 
 /// QoS of clients: replies are longer than requests.
@@ -70,7 +70,7 @@ struct Inner {
 
 /// Endpoints of a client.
 struct Remote {
-    asking: Asking,
+    remote_calls: RemoteCalls,
     _task: Task<()>,
     _graph: [NodeEndpoint; 2],
 }
@@ -113,7 +113,7 @@ impl Inner {
                 }
             }
             None => match self.remote() {
-                Ok(remote) => remote.asking.call(&request).await,
+                Ok(remote) => remote.remote_calls.call(&request).await,
                 Err(error) => Err(error.to_string()),
             },
         };
@@ -146,7 +146,9 @@ impl Inner {
         let name = self.name.clone();
         let remote = lock(&self.remote);
         match &*remote {
-            Some(remote) if remote.asking.servers.remote() == 0 => CallError::NoServer { name },
+            Some(remote) if remote.remote_calls.servers.remote() == 0 => {
+                CallError::NoServer { name }
+            }
             _ => CallError::Late {
                 name,
                 patience_s: patience.as_secs_f64(),
@@ -194,18 +196,18 @@ impl Shared {
             .map(|kind| Arc::new(Peers::new(name, kind, log::Level::Debug)));
         self.endpoints.register(requests.id(), &servers);
         self.endpoints.register(answers.id(), &answerers);
-        let waiting = Arc::new(Waiting::default());
+        let waiting = Arc::new(PendingCalls::default());
         let listen = Arc::clone(&waiting).listen(Arc::clone(&answers));
         let task = self.io.spawn(listen).ok_or_else(|| closed(name))?;
         let next = AtomicI64::new(1);
         Ok(Remote {
-            asking: Asking {
+            remote_calls: RemoteCalls {
                 form,
                 requests,
                 servers,
                 answerers,
                 answers,
-                acquainted: Mutex::default(),
+                last_matched: Mutex::default(),
                 waiting,
                 next,
             },

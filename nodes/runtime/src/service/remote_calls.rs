@@ -19,13 +19,13 @@ const LOOK: Duration = Duration::from_millis(1);
 
 /// Longest wait of a first request for its server to discover the client: the heartbeat period of Fast DDS, after
 /// which it repairs discovery.
-const ACQUAINTANCE: Duration = Duration::from_secs(3);
+const MATCH_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Calls without reply so far.
 #[derive(Default)]
-pub(crate) struct Waiting(Mutex<BTreeMap<Header, Sender<Vec<u8>>>>);
+pub(crate) struct PendingCalls(Mutex<BTreeMap<Header, Sender<Vec<u8>>>>);
 
-impl Waiting {
+impl PendingCalls {
     /// Passes a reply to its call; replies to other clients are ignored.
     fn hear(&self, bytes: &[u8], origin: &Origin) {
         let Some((request, answer)) = read_answer(bytes, origin) else {
@@ -49,7 +49,7 @@ impl Waiting {
 }
 
 /// Remote calls of one client.
-pub(crate) struct Asking {
+pub(crate) struct RemoteCalls {
     pub form: ServiceForm,
     pub requests: Arc<Outbox>,
     /// Peers of the request writer.
@@ -58,12 +58,12 @@ pub(crate) struct Asking {
     pub answerers: Arc<Peers>,
     pub answers: Arc<dyn SampleReader>,
     /// Reply writer that was last waited for.
-    pub acquainted: Mutex<Option<EndpointId>>,
-    pub waiting: Arc<Waiting>,
+    pub last_matched: Mutex<Option<EndpointId>>,
+    pub waiting: Arc<PendingCalls>,
     pub next: AtomicI64,
 }
 
-impl Asking {
+impl RemoteCalls {
     /// Sends a request once a server is discovered, and waits for the reply.
     pub(crate) async fn call(&self, request: &[u8]) -> Result<Vec<u8>, String> {
         let server = self.servers.known(|_| true).await;
@@ -90,19 +90,19 @@ impl Asking {
     /// Waits until the reply writer has matched our reader: the server may miss a discovery datagram, and a
     /// reply without a matched reader is lost.
     async fn until_known_to(&self, answerer: &EndpointId) {
-        if *lock(&self.acquainted) == Some(*answerer) {
+        if *lock(&self.last_matched) == Some(*answerer) {
             return;
         }
         let begin = Instant::now();
-        while !self.answers.is_known_to(answerer) && begin.elapsed() < ACQUAINTANCE {
+        while !self.answers.is_known_to(answerer) && begin.elapsed() < MATCH_TIMEOUT {
             Timer::after(LOOK).await;
         }
-        *lock(&self.acquainted) = Some(*answerer);
+        *lock(&self.last_matched) = Some(*answerer);
     }
 }
 
 /// Removes a finished or abandoned call when dropped.
-struct Forget<'a>(&'a Waiting, Header);
+struct Forget<'a>(&'a PendingCalls, Header);
 
 impl Drop for Forget<'_> {
     fn drop(&mut self) {
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn answers_go_to_who_asked() {
-        let waiting = Waiting::default();
+        let waiting = PendingCalls::default();
         let (sender, answer) = bounded(1);
         lock(&waiting.0).insert([7; 16], sender);
         let sample = SampleId {
