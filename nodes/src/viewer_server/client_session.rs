@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::inputs::Input;
 use super::offer::{MAX_MESSAGE_BYTES, Offer, OpenTopic};
-use super::protocol::{self, ClientChannel, ClientData, ClientMessage, Value, Wish};
+use super::protocol::{self, ClientChannel, ClientData, ClientMessage, SubscriptionRequest, Value};
 
 /// Limit of requests without reply per client.
 const MAX_IN_FLIGHT: usize = 16;
@@ -35,7 +35,7 @@ pub enum BridgeRequest {
 #[derive(Debug, PartialEq)]
 pub enum SessionAction {
     /// Subscribe to channels.
-    Subscribe(Vec<Wish>),
+    Subscribe(Vec<SubscriptionRequest>),
     /// Unsubscribe.
     Unsubscribe(Vec<u32>),
     /// Start or stop watching these parameters; none: all.

@@ -18,13 +18,13 @@ use smol::{Async, Timer};
 
 use super::broadcaster::Broadcaster;
 use super::client_session::{ClientSession, SessionAction};
-use super::flow::Flow;
+use super::connection_limit::ConnectionLimit;
 use super::http::{Decision, Head, HeadError, MAX_HEAD_BYTES, RequestAuth, Response};
 use super::inputs::{Input, InputRefusal};
 use super::offer::{MAX_MESSAGE_BYTES, MESSAGE_HEAD_BYTES};
 use super::outbox::Outgoing;
 use super::protocol::message_data;
-use super::room::Room;
+use super::rate_limit::RateLimit;
 use super::stream::{ClientStream, Progress};
 
 /// Timeout of receiving a request.
@@ -40,11 +40,11 @@ type Stream = Async<TcpStream>;
 
 /// Limits of connections before they become clients; clients are limited by [`Broadcaster`].
 #[derive(Default)]
-pub struct Rooms {
+pub struct ConnectionLimits {
     /// Connections with an incomplete request.
-    asking: Rc<Room>,
+    asking: Rc<ConnectionLimit>,
     /// Connections whose response is being sent.
-    answered: Rc<Room>,
+    answered: Rc<ConnectionLimit>,
 }
 
 /// Serves a connection until it ends.
@@ -53,13 +53,13 @@ pub async fn serve(
     from: IpAddr,
     auth: Arc<RequestAuth>,
     broadcaster: Arc<Broadcaster>,
-    rooms: &Rooms,
+    limits: &ConnectionLimits,
 ) -> io::Result<()> {
     rustix::net::sockopt::set_socket_send_buffer_size(&stream, SEND_BUFFER_BYTES)?;
     stream.set_nodelay(true)?;
     let mut stream = Async::new(stream)?;
-    let asking = rooms.asking.enter(from);
-    broadcaster.count_displaced(rooms.asking.take_displaced());
+    let asking = limits.asking.enter(from);
+    broadcaster.count_displaced(limits.asking.take_displaced());
     let head = within(HEAD_TIME, read_head(&mut stream));
     let head = asking.served(head).await?;
     drop(asking);
@@ -81,8 +81,8 @@ pub async fn serve(
             Response::bad_request()
         }
     };
-    let answered = rooms.answered.enter(from);
-    broadcaster.count_displaced(rooms.answered.take_displaced());
+    let answered = limits.answered.enter(from);
+    broadcaster.count_displaced(limits.answered.take_displaced());
     let answer = async {
         stream.write_all(&answer.bytes()).await?;
         stream.close().await
@@ -128,7 +128,7 @@ async fn talk(
         .max_frame_size(longest);
     let mut socket = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
     let mut session = ClientSession::new(offer);
-    let mut flow = Flow::new(offer.stream_bytes_per_s, Instant::now());
+    let mut rate_limit = RateLimit::new(offer.stream_bytes_per_s, Instant::now());
     let mut asked = FuturesUnordered::new();
     loop {
         // Received messages first, so that an unsubscription takes effect at once.
@@ -169,7 +169,7 @@ async fn talk(
                 SessionAction::Done
             }
             // Rate limited before parsing.
-            Event::Come(Some(Ok(message))) if !is_paced(&mut flow, message.len()) => {
+            Event::Come(Some(Ok(message))) if !is_paced(&mut rate_limit, message.len()) => {
                 let refusal = InputRefusal::TooMuch;
                 if let Some(bridge) = broadcaster.bridge() {
                     bridge.inputs().refused(refusal);
@@ -210,7 +210,7 @@ async fn talk(
                 None => session.answered(),
             },
             SessionAction::Input(input) => {
-                if let Some(refusal) = take(broadcaster, id, &mut flow, input) {
+                if let Some(refusal) = take(broadcaster, id, &mut rate_limit, input) {
                     broadcaster.refuse(id, refusal);
                 }
             }
@@ -228,17 +228,22 @@ enum Event {
 }
 
 /// True for a short message, or one within the rate limit of headsets.
-fn is_paced(flow: &mut Flow, bytes: usize) -> bool {
-    bytes <= MAX_MESSAGE_BYTES || flow.admits(bytes, Instant::now())
+fn is_paced(rate_limit: &mut RateLimit, bytes: usize) -> bool {
+    bytes <= MAX_MESSAGE_BYTES || rate_limit.admits(bytes, Instant::now())
 }
 
 /// Passes a headset message to the bridge within the client's rate limit; rejected ones are counted.
-fn take(broadcaster: &Broadcaster, id: u64, flow: &mut Flow, input: Input) -> Option<InputRefusal> {
+fn take(
+    broadcaster: &Broadcaster,
+    id: u64,
+    rate_limit: &mut RateLimit,
+    input: Input,
+) -> Option<InputRefusal> {
     let bridge = broadcaster.bridge()?;
     // A long message was charged on reception.
     let head_and_message = input.bytes.len() + MESSAGE_HEAD_BYTES;
     let is_long = head_and_message > MAX_MESSAGE_BYTES;
-    let taken = match is_long || flow.admits(input.bytes.len(), Instant::now()) {
+    let taken = match is_long || rate_limit.admits(input.bytes.len(), Instant::now()) {
         true => bridge.take(id, input),
         false => Err(InputRefusal::TooMuch),
     };

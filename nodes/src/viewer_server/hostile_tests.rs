@@ -9,7 +9,7 @@ use async_tungstenite::tungstenite::client::IntoClientRequest;
 use async_tungstenite::tungstenite::{Message, WebSocket, client};
 use rustix::net::sockopt::set_socket_recv_buffer_size;
 
-use super::room::{MAX_CONNECTIONS, MAX_PER_ADDRESS};
+use super::connection_limit::{MAX_CONNECTIONS, MAX_PER_ADDRESS};
 use super::stream::STALL_TIME;
 use super::tests::{connect, data, server, text};
 use super::*;

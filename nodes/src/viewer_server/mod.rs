@@ -8,9 +8,9 @@ mod broadcaster;
 mod client;
 mod client_session;
 mod connection;
+mod connection_limit;
 mod counts;
 mod fixed;
-mod flow;
 mod graph;
 mod http;
 mod inputs;
@@ -22,7 +22,7 @@ mod options;
 mod outbox;
 mod parameters;
 mod protocol;
-mod room;
+mod rate_limit;
 mod server;
 mod sources;
 mod stream;
@@ -43,7 +43,7 @@ pub use offer::{Offer, OpenTopic};
 pub use options::{ViewerOptions, url};
 pub use outbox::{Class, Outbox, Outgoing};
 pub use parameters::declare;
-pub use protocol::{AdvertisedService, ClientChannel, SUBPROTOCOLS, Value, Wish};
+pub use protocol::{AdvertisedService, ClientChannel, SUBPROTOCOLS, SubscriptionRequest, Value};
 pub use server::Server;
 
 #[cfg(test)]

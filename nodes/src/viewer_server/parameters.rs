@@ -1,6 +1,6 @@
 //! Parameters of the viewer.
 
-use super::bridge::{HeadsetReach, Reach};
+use super::bridge::{BridgeOptions, HeadsetLimits};
 use super::offer::MAX_MESSAGE_BYTES;
 use super::options::ViewerOptions;
 use crate::compute::ComputeLimits;
@@ -36,7 +36,7 @@ const SOCKET: &str = "the server is made with it";
 pub(super) struct Settings {
     pub viewer: ViewerOptions,
     pub limits: ComputeLimits,
-    pub reach: Reach,
+    pub reach: BridgeOptions,
     pub report_file: String,
 }
 
@@ -52,7 +52,7 @@ impl Settings {
                 bytes: options::inbox_bytes(params, 64 << 20)?,
                 threads: options::threads(params, 1)?,
             },
-            reach: Reach {
+            reach: BridgeOptions {
                 allow_write: params.bool("allow_write", false)?,
                 mapper: params.string("mapper", "lattice_mapper")?,
                 player: params.string("player", "bag_player")?,
@@ -66,7 +66,7 @@ impl Settings {
 }
 
 /// Limits of headset messages from clients, if allowed.
-fn headset(params: &Params) -> Result<Option<HeadsetReach>, ParamError> {
+fn headset(params: &Params) -> Result<Option<HeadsetLimits>, ParamError> {
     let allow = params.bool("allow_headset", false)?;
     let message_bytes = params.usize_in(
         "headset_message_bytes",
@@ -79,7 +79,7 @@ fn headset(params: &Params) -> Result<Option<HeadsetReach>, ParamError> {
         return Err(params.invalid("headset_bytes_per_s", problem));
     }
     let calibrator = params.string("calibrator", "semantic_icp_server")?;
-    Ok(allow.then_some(HeadsetReach {
+    Ok(allow.then_some(HeadsetLimits {
         message_bytes,
         bytes_per_s,
         calibrator,

@@ -12,7 +12,7 @@ use smol::channel::{Sender, bounded};
 use smol::{Async, LocalExecutor, Timer};
 
 use super::broadcaster::Broadcaster;
-use super::connection::{self, Rooms};
+use super::connection::{self, ConnectionLimits};
 use super::http::RequestAuth;
 
 /// Time for clients to read the last messages.
@@ -89,7 +89,7 @@ async fn accept(
     auth: Arc<RequestAuth>,
     broadcaster: Arc<Broadcaster>,
 ) {
-    let rooms = Rc::new(Rooms::default());
+    let limits = Rc::new(ConnectionLimits::default());
     let warnings = Throttle::new(Duration::from_secs(5));
     loop {
         let (stream, from) = match accepted(&listener).await {
@@ -103,14 +103,15 @@ async fn accept(
                 continue;
             }
         };
-        let (auth, broadcaster, rooms) = (
+        let (auth, broadcaster, limits) = (
             Arc::clone(&auth),
             Arc::clone(&broadcaster),
-            Rc::clone(&rooms),
+            Rc::clone(&limits),
         );
         executor
             .spawn(async move {
-                if let Err(error) = connection::serve(stream, from, auth, broadcaster, &rooms).await
+                if let Err(error) =
+                    connection::serve(stream, from, auth, broadcaster, &limits).await
                 {
                     log::debug!("a connection ended: {error}");
                 }

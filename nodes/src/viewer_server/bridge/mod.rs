@@ -49,7 +49,7 @@ pub trait Bridge: Send + Sync {
 
 /// Nodes accessible to clients.
 #[derive(Clone, Debug)]
-pub struct Reach {
+pub struct BridgeOptions {
     /// True if clients may change state.
     pub allow_write: bool,
     /// Name of the mapper.
@@ -61,12 +61,12 @@ pub struct Reach {
     /// Topic of goals (`geometry_msgs/PoseStamped`).
     pub goal_topic: String,
     /// Limits of headset messages from clients; `None`: not allowed.
-    pub headset: Option<HeadsetReach>,
+    pub headset: Option<HeadsetLimits>,
 }
 
 /// Limits of headset messages from clients.
 #[derive(Clone, Debug)]
-pub struct HeadsetReach {
+pub struct HeadsetLimits {
     /// Longest message, bytes.
     pub message_bytes: usize,
     /// Rate limit per client, bytes per second.
@@ -94,7 +94,7 @@ impl NodeBridge {
     /// clients are passed to `hand_over`, and published by the returned topics.
     pub fn new(
         node: &Node,
-        reach: &Reach,
+        reach: &BridgeOptions,
         broadcaster: &Arc<Broadcaster>,
         (inputs, hand_over): (Arc<Inputs>, HandOver),
     ) -> Result<(Self, HeadsetTopics), NodeError> {

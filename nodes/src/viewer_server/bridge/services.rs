@@ -11,7 +11,7 @@ use lattice_msgs::std_srvs::Trigger;
 use lattice_msgs::{RosMessage, RosService};
 use lattice_runtime::{Client, Node, RuntimeError};
 
-use super::{PATIENCE, Reach};
+use super::{BridgeOptions, PATIENCE};
 use crate::viewer_server::protocol::AdvertisedService;
 
 /// Timeout of a calibration, which may include a search.
@@ -47,7 +47,7 @@ impl Table<'_> {
 /// Services in the order of their ids; those that change state only if allowed.
 pub(super) fn of(
     node: &Node,
-    reach: &Reach,
+    reach: &BridgeOptions,
 ) -> Result<(Vec<AdvertisedService>, Clients), RuntimeError> {
     let mut table = Table {
         node,

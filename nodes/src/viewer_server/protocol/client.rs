@@ -30,7 +30,7 @@ pub enum ClientMessage {
     /// Subscribe to channels.
     Subscribe {
         /// Requested subscriptions.
-        subscriptions: Vec<Wish>,
+        subscriptions: Vec<SubscriptionRequest>,
     },
     /// Unsubscribe.
     Unsubscribe {
@@ -86,7 +86,7 @@ pub enum ClientMessage {
 /// Requested subscription.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
 #[serde(rename_all = "camelCase")]
-pub struct Wish {
+pub struct SubscriptionRequest {
     /// Subscription id, chosen by the client.
     pub id: u32,
     /// Channel of the server.
@@ -207,7 +207,8 @@ mod tests {
 
     #[test]
     fn messages_are_read() {
-        let wishes = [(7, 2), (8, 3)].map(|(id, channel_id)| Wish { id, channel_id });
+        let wishes =
+            [(7, 2), (8, 3)].map(|(id, channel_id)| SubscriptionRequest { id, channel_id });
         let subscriptions = wishes.to_vec();
         let message = ClientMessage::parse(SUBSCRIBE).unwrap();
         assert_eq!(message, ClientMessage::Subscribe { subscriptions });

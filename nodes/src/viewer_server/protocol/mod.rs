@@ -3,7 +3,7 @@
 mod client;
 mod server;
 
-pub use client::{ClientChannel, ClientData, ClientMessage, Value, Wish};
+pub use client::{ClientChannel, ClientData, ClientMessage, SubscriptionRequest, Value};
 pub use server::{
     Advertised, AdvertisedService, GraphUpdate, advertise, advertise_services,
     connection_graph_update, message_data, parameter_values, server_info, service_failure,
