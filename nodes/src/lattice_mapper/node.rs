@@ -50,7 +50,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let (maps, old) = (settings.maps, settings.mapper.clone());
     let lost = Arc::new(AtomicU64::new(0));
     let (clouds, inputs) = (Losses::default(), Losses::default());
-    let wishes = Arc::new(Wishes::default());
+    let update_requests = Arc::new(UpdateRequests::default());
     let max_voxels = Arc::new(AtomicUsize::new(old.voxel_limit()));
     let mut machine = LatticeMapper::new(settings.mapper, epoch())?;
     let (output, requests) = MapOutput::open(&node)?;
@@ -74,7 +74,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         inputs: inputs.clone(),
         refusals: Throttle::new(Duration::from_secs(5)),
         no_viewpoints: Once::new(),
-        wishes: Arc::clone(&wishes),
+        update_requests: Arc::clone(&update_requests),
         writing: None,
         maps: maps.clone(),
         centers_of: None,
@@ -95,7 +95,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         SubscriptionExecutor::Dedicated,
         hand_over,
     )?;
-    let origins = Arc::clone(&wishes);
+    let origins = Arc::clone(&update_requests);
     let take = move |origin| *lock(&origins.origin) = Some(origin);
     let origins = node.subscribe(
         "map_origin",
@@ -116,7 +116,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         }
         false => None,
     };
-    centers.on_subscriber_joined(move || wishes.centers.store(true, Ordering::Relaxed));
+    centers.on_subscriber_joined(move || update_requests.centers.store(true, Ordering::Relaxed));
     let services = inbox.clone();
     let mut more = Vec::new();
     match settings.octomap_services {
@@ -166,7 +166,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 
 /// Requests for the next update, kept independently of the inbox.
 #[derive(Default)]
-struct Wishes {
+struct UpdateRequests {
     centers: AtomicBool,
     origin: Mutex<Option<Arc<GeoPointStamped>>>,
 }
@@ -194,7 +194,7 @@ struct ComputeState {
     inputs: Losses,
     refusals: Throttle,
     no_viewpoints: Once,
-    wishes: Arc<Wishes>,
+    update_requests: Arc<UpdateRequests>,
     /// Thread that writes a map file.
     writing: Option<JoinHandle<()>>,
     /// Folder of map files.
@@ -246,7 +246,7 @@ impl ComputeState {
 
     /// Publishes an update, and a keyframe on request or after a lost update.
     fn update(&mut self) {
-        if let Some(origin) = lock(&self.wishes.origin).take() {
+        if let Some(origin) = lock(&self.update_requests.origin).take() {
             self.machine.on_origin(&origin);
         }
         let update = self.machine.take_update();
@@ -256,7 +256,7 @@ impl ComputeState {
 
     fn centers(&mut self) {
         let state = self.machine.state();
-        let asked = self.wishes.centers.swap(false, Ordering::Relaxed);
+        let asked = self.update_requests.centers.swap(false, Ordering::Relaxed);
         let listened = self.outputs.centers.subscriber_count() > 0;
         if !listened || (!asked && self.centers_of == Some(state)) {
             return;
