@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// Counters of pixels and points.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct LookCounts {
+pub struct ViewCounts {
     /// Pixels of label images, after the stride.
     pub pixels: u64,
     /// Rejected: outside the distortion model.
@@ -45,7 +45,7 @@ pub struct HeadsetCounts {
     pub clouds_without_probs: u64,
     /// Pixels and points.
     #[serde(flatten)]
-    pub look: LookCounts,
+    pub look: ViewCounts,
     /// Messages rejected or dropped, by topic and reason.
     pub dropped: BTreeMap<String, u64>,
 }

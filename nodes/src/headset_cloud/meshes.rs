@@ -7,7 +7,7 @@ use lattice_msgs::visualization_msgs::Marker;
 
 use super::marker::{FromMarker, from_marker};
 use super::refusal::{MeshRefusal, shown};
-use super::session::Told;
+use super::session::SessionUpdate;
 use super::surfaces::Change;
 use super::{HeadsetCloud, HeadsetOutput};
 use crate::mesh::LabelledMesh;
@@ -56,9 +56,9 @@ impl HeadsetCloud {
     /// Handles the session of the headset: a new session has a new origin.
     pub fn on_session(&mut self, text: &str) {
         match self.session.on_topic(text, self.now_ns) {
-            Told::Same | Told::First => {}
-            Told::Another => self.begin_session(),
-            Told::Ended => self.refuse("session", "malformed", "its text is too long"),
+            SessionUpdate::Same | SessionUpdate::First => {}
+            SessionUpdate::Another => self.begin_session(),
+            SessionUpdate::Ended => self.refuse("session", "malformed", "its text is too long"),
         }
     }
 
@@ -68,17 +68,17 @@ impl HeadsetCloud {
         outputs: &mut Vec<HeadsetOutput>,
     ) -> Result<Change, MeshRefusal> {
         self.surfaces.check(message)?;
-        let told = self.session.on_mesh(&message.session, self.now_ns);
-        if told == Told::Ended {
+        let update = self.session.on_mesh(&message.session, self.now_ns);
+        if update == SessionUpdate::Ended {
             return Err(MeshRefusal::OtherSession {
                 surface: shown(&message.surface),
                 found: shown(&message.session),
             });
         }
-        if told == Told::Another {
+        if update == SessionUpdate::Another {
             self.begin_session();
         }
-        if told != Told::Same {
+        if update != SessionUpdate::Same {
             outputs.push(HeadsetOutput::Session(message.session.clone()));
         }
         self.surfaces.on_mesh(message, self.now_ns)
@@ -90,7 +90,7 @@ impl HeadsetCloud {
         self.surfaces.clear();
         self.poses.clear();
         self.drop_waiting(Some("other_session"));
-        self.room = None;
+        self.raycast_mesh = None;
         self.changed_ns = None;
     }
 
@@ -101,7 +101,7 @@ impl HeadsetCloud {
         counts.triangles_degenerate += change.degenerate;
         counts.drop_some("mesh", "incomplete", change.incomplete);
         if change.replaced + change.removed > 0 {
-            self.room = None;
+            self.raycast_mesh = None;
             self.changed_ns = Some(stamp_ns);
         }
     }

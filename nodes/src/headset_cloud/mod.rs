@@ -4,7 +4,6 @@
 
 mod chunks;
 mod counts;
-mod look;
 mod marker;
 mod meshes;
 pub mod node;
@@ -14,14 +13,15 @@ mod poses;
 mod refusal;
 mod session;
 mod surfaces;
+mod view;
 mod waiting;
 
-pub use counts::{HeadsetCounts, HeadsetReport, LookCounts};
-pub use look::LookOptions;
+pub use counts::{HeadsetCounts, HeadsetReport, ViewCounts};
 pub use options::{HeadsetOptions, LabelsFrom, PoseSource};
 pub use parameters::declare;
 pub use refusal::MeshRefusal;
 pub use surfaces::MeshOptions;
+pub use view::ViewOptions;
 pub use waiting::HeadsetStream;
 
 use std::sync::Arc;
@@ -32,10 +32,10 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::LabelInfo;
 use nalgebra::Isometry3;
 
-use self::look::{Look, Room, placed};
 use self::poses::{PoseAt, Poses};
 use self::session::Session;
 use self::surfaces::Surfaces;
+use self::view::{LabelledView, RaycastMesh, placed};
 use self::waiting::Waiting;
 use crate::camera::{Camera, Classes, Content, ImageView, LabelSet};
 use crate::convert::geometry::header;
@@ -59,7 +59,7 @@ pub struct HeadsetCloud {
     options: HeadsetOptions,
     surfaces: Surfaces,
     /// Mesh for ray casting, built with its first image; inner `None`: the mesh is unusable.
-    room: Option<Option<Room>>,
+    raycast_mesh: Option<Option<RaycastMesh>>,
     /// Stamp of the newest mesh change without a cloud.
     changed_ns: Option<i64>,
     session: Session,
@@ -82,7 +82,7 @@ impl HeadsetCloud {
     pub fn new(options: HeadsetOptions) -> Self {
         Self {
             surfaces: Surfaces::new(options.mesh.clone()),
-            room: None,
+            raycast_mesh: None,
             changed_ns: None,
             session: Session::default(),
             now_ns: 0,
@@ -228,13 +228,13 @@ impl HeadsetCloud {
         let Some(stamp_ns) = self.changed_ns.take() else {
             return Vec::new();
         };
-        self.build_room();
-        let Some(Some(room)) = &self.room else {
+        self.build_raycast_mesh();
+        let Some(Some(raycast_mesh)) = &self.raycast_mesh else {
             return Vec::new();
         };
         let (spacing_m, max_points) = (self.options.spacing_m, self.options.max_points);
         let counts = &mut self.counts.look;
-        let points = room.sampled(spacing_m, max_points, &self.classes, counts);
+        let points = raycast_mesh.sampled(spacing_m, max_points, &self.classes, counts);
         if points.is_empty() {
             return Vec::new();
         }
@@ -303,9 +303,9 @@ impl HeadsetCloud {
     }
 
     fn cloud(&mut self, set: &LabelSet, pose: &Isometry3<f64>) -> Option<PointCloud2> {
-        self.build_room();
+        self.build_raycast_mesh();
         let camera = self.camera.as_ref()?;
-        let Some(Some(room)) = &self.room else {
+        let Some(Some(raycast_mesh)) = &self.raycast_mesh else {
             self.counts.drop_some("labels", "no_mesh", 1);
             return None;
         };
@@ -318,14 +318,14 @@ impl HeadsetCloud {
             self.refuse("labels", "too_large", "larger than `max_image_pixels`");
             return None;
         };
-        let mut look = Look {
+        let mut view = LabelledView {
             pixels,
             rays: &self.rays,
             width,
             camera: placed(pose, self.options.pose_axes(), self.options.camera_axes),
         };
         let counts = &mut self.counts.look;
-        match room.see(&mut look, &self.options.look, &self.classes, counts) {
+        match raycast_mesh.see(&mut view, &self.options.look, &self.classes, counts) {
             Ok(points) if points.is_empty() => {
                 let problem = "none of its rays meets the mesh";
                 self.refuse("labels", "sees_no_mesh", problem);
@@ -351,15 +351,15 @@ impl HeadsetCloud {
     }
 
     /// Rebuilds the ray casting index after a change.
-    fn build_room(&mut self) {
-        if self.room.is_some() {
+    fn build_raycast_mesh(&mut self) {
+        if self.raycast_mesh.is_some() {
             return;
         }
-        let room = self.surfaces.merged().and_then(Room::new);
-        if let Err(error) = &room {
+        let raycast_mesh = self.surfaces.merged().and_then(RaycastMesh::new);
+        if let Err(error) = &raycast_mesh {
             self.refuse("mesh", error.name(), &error.to_string());
         }
-        self.room = Some(room.ok());
+        self.raycast_mesh = Some(raycast_mesh.ok());
     }
 
     /// Names of the classes that points may have.

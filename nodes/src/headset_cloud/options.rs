@@ -2,8 +2,8 @@
 
 use lattice_core::pose::Axes;
 
-use super::look::LookOptions;
 use super::surfaces::MeshOptions;
+use super::view::ViewOptions;
 use crate::camera::ClassRules;
 use crate::options::{frame, one_of};
 use lattice_runtime::params::{ParamError, Params};
@@ -57,7 +57,7 @@ pub struct HeadsetOptions {
     /// True for rectified images: `p` of the camera is used, without distortion.
     pub rectified: bool,
     /// Selection of the pixels that become points.
-    pub look: LookOptions,
+    pub look: ViewOptions,
     /// Mapping of the classes.
     pub classes: ClassRules,
 }
@@ -97,7 +97,7 @@ impl HeadsetOptions {
             use_confidence: params.bool("use_confidence", false)?,
             max_image_pixels: params.positive("max_image_pixels", 4_000_000)?,
             rectified: params.bool("rectified", false)?,
-            look: LookOptions {
+            look: ViewOptions {
                 stride: params.positive("stride", 4)?,
                 min_range_m,
                 max_range_m,

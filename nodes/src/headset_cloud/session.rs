@@ -7,7 +7,7 @@ const MAX_TEXT: usize = 256;
 
 /// Effect of a session in a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Told {
+pub(super) enum SessionUpdate {
     /// The current session, or none.
     Same,
     /// The first session.
@@ -39,30 +39,30 @@ pub(super) struct Session {
 impl Session {
     /// Handles the session topic. An ended session does not resume: the node receives its own
     /// messages with a delay.
-    pub fn on_topic(&mut self, text: &str, now_ns: i64) -> Told {
+    pub fn on_topic(&mut self, text: &str, now_ns: i64) -> SessionUpdate {
         if text.len() > MAX_TEXT {
-            return Told::Ended;
+            return SessionUpdate::Ended;
         }
         match &self.now {
-            Some(now) if now == text => Told::Same,
-            _ if self.has_ended(text) => Told::Same,
+            Some(now) if now == text => SessionUpdate::Same,
+            _ if self.has_ended(text) => SessionUpdate::Same,
             _ => self.begin(text, now_ns),
         }
     }
 
     /// Handles the session of a mesh: an ended one resumes only after a silence of the current one.
-    pub fn on_mesh(&mut self, text: &str, now_ns: i64) -> Told {
+    pub fn on_mesh(&mut self, text: &str, now_ns: i64) -> SessionUpdate {
         if text.len() > MAX_TEXT {
-            return Told::Ended;
+            return SessionUpdate::Ended;
         }
         let is_silent = now_ns.saturating_sub(self.heard_ns) > SILENT_NS;
         match &self.now {
-            _ if text.is_empty() => Told::Same,
+            _ if text.is_empty() => SessionUpdate::Same,
             Some(now) if now == text => {
                 self.heard_ns = now_ns;
-                Told::Same
+                SessionUpdate::Same
             }
-            Some(_) if self.has_ended(text) && !is_silent => Told::Ended,
+            Some(_) if self.has_ended(text) && !is_silent => SessionUpdate::Ended,
             _ => self.begin(text, now_ns),
         }
     }
@@ -71,16 +71,16 @@ impl Session {
         self.ended.iter().any(|ended| ended == text)
     }
 
-    fn begin(&mut self, text: &str, now_ns: i64) -> Told {
+    fn begin(&mut self, text: &str, now_ns: i64) -> SessionUpdate {
         self.heard_ns = now_ns;
         self.ended.retain(|ended| ended != text);
         let Some(before) = self.now.replace(text.to_owned()) else {
-            return Told::First;
+            return SessionUpdate::First;
         };
         self.ended.push_back(before);
         if self.ended.len() > MAX_ENDED {
             self.ended.pop_front();
         }
-        Told::Another
+        SessionUpdate::Another
     }
 }

@@ -3,7 +3,7 @@
 use lattice_core::pose::Axes;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
-use super::counts::LookCounts;
+use super::counts::ViewCounts;
 use crate::camera::{Classes, LabelledPoints, Pixel, PixelReader, PointLayout};
 use crate::mesh::{LabelledMesh, MeshError, MeshScene};
 
@@ -12,7 +12,7 @@ const MIN_HITS: u64 = 20;
 
 /// Selection of the pixels that become points.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LookOptions {
+pub struct ViewOptions {
     /// Step between columns and between rows.
     pub stride: usize,
     /// Nearer hits are ignored, m.
@@ -24,13 +24,13 @@ pub struct LookOptions {
 }
 
 /// Mesh in headset_origin, indexed for ray casting.
-pub(super) struct Room {
+pub(super) struct RaycastMesh {
     mesh: LabelledMesh,
     scene: MeshScene,
 }
 
 /// Label image with the rays of its pixels.
-pub(super) struct Look<'a> {
+pub(super) struct LabelledView<'a> {
     /// Labels and companion images, sampled at the pixels of the camera.
     pub pixels: PixelReader<'a>,
     /// x / z and y / z of each camera pixel; NaN: no ray.
@@ -55,7 +55,7 @@ pub(super) fn placed(
     (place.into(), ros_from_optical)
 }
 
-impl Room {
+impl RaycastMesh {
     /// Indexes a mesh.
     pub fn new(mesh: LabelledMesh) -> Result<Self, MeshError> {
         let scene = MeshScene::new_fast(&mesh)?;
@@ -65,27 +65,27 @@ impl Room {
     /// Points seen by the pixels, or the numbers of hits from behind and of all hits.
     pub fn see(
         &self,
-        look: &mut Look,
-        options: &LookOptions,
+        view: &mut LabelledView,
+        options: &ViewOptions,
         classes: &Classes,
-        counts: &mut LookCounts,
+        counts: &mut ViewCounts,
     ) -> Result<LabelledPoints, [u64; 2]> {
-        let width = look.width.max(1);
-        let height = look.rays.len() / width;
+        let width = view.width.max(1);
+        let height = view.rays.len() / width;
         let stride = options.stride.max(1);
-        let (origin_m, ros_from_optical) = &look.camera;
+        let (origin_m, ros_from_optical) = &view.camera;
         let most = width.div_ceil(stride) * height.div_ceil(stride);
         let layout = PointLayout {
             viewpoint_m: Some(origin_m.coords.map(|c| c as f32).into()),
-            ..look.pixels.layout(classes)
+            ..view.pixels.layout(classes)
         };
         let layout = layout.bounded(most);
-        let (mut points, mut new) = (LabelledPoints::new(layout, 0), LookCounts::default());
+        let (mut points, mut new) = (LabelledPoints::new(layout, 0), ViewCounts::default());
         let (mut hits, mut behind) = (0, 0);
         for row in (0..height).step_by(stride) {
-            look.pixels.seek(row, height);
+            view.pixels.seek(row, height);
             for column in (0..width).step_by(stride) {
-                let Some(&[x, y]) = look.rays.get(row * width + column) else {
+                let Some(&[x, y]) = view.rays.get(row * width + column) else {
                     continue;
                 };
                 new.pixels += 1;
@@ -105,7 +105,7 @@ impl Room {
                 behind += u64::from(self.is_behind(hit.triangle, &direction));
                 let point_m = (origin_m + direction * hit.distance_m).coords;
                 let place: [f32; 3] = point_m.map(|c| c as f32).into();
-                points.push(place, &look.pixels.at(column), classes);
+                points.push(place, &view.pixels.at(column), classes);
             }
         }
         if options.check_winding && hits >= MIN_HITS && 2 * behind > hits {
@@ -123,7 +123,7 @@ impl Room {
         spacing_m: f64,
         max_points: usize,
         classes: &Classes,
-        counts: &mut LookCounts,
+        counts: &mut ViewCounts,
     ) -> LabelledPoints {
         let triangles = || self.mesh.corners_m().zip(self.mesh.labels());
         let area_m2 = |corners: [[f32; 3]; 3]| {
@@ -168,7 +168,7 @@ impl Room {
     }
 }
 
-impl LookCounts {
+impl ViewCounts {
     fn add(&mut self, other: &Self) {
         self.pixels += other.pixels;
         self.pixels_no_ray += other.pixels_no_ray;
