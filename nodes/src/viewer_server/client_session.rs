@@ -152,9 +152,7 @@ impl<'a> ClientSession<'a> {
 
     fn message(&mut self, channel: u32, payload: &[u8]) -> SessionAction {
         let Some(&(topic, is_json)) = self.channels.get(&channel) else {
-            return reject(&format!(
-                "channel {channel} was not advertised by this client"
-            ));
+            return reject(&format!("channel {channel} is not advertised"));
         };
         let streams = self.offer.topics.get(topic);
         if streams.is_some_and(|topic| topic.stream_bytes.is_some()) {
