@@ -220,7 +220,7 @@ mod tests {
         for name in FILES {
             let error = find("/robot/mapper", None).unwrap_err().to_string();
             let path = folder.join(name).display().to_string();
-            assert!(error.contains(&format!("{path}, which")), "{error}");
+            assert!(error.contains(&format!("{path} cannot be read")), "{error}");
             fs::write(folder.join(name), "").unwrap();
         }
         let secrets = find("/robot/mapper", None).unwrap();

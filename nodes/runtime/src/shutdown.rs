@@ -312,7 +312,7 @@ mod tests {
             assert!(kill.success());
             match signal {
                 0 => until("shutting down"),
-                1 => until("shutting down already"),
+                1 => until("shutdown is in progress"),
                 _ => {}
             }
         }

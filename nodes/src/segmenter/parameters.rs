@@ -190,7 +190,9 @@ mod tests {
             assert!(begin.elapsed() < Duration::from_secs(2), "{error}");
             error
         };
-        assert!(late(&shutdown, Duration::from_millis(1)).contains("not ready"));
+        assert!(
+            late(&shutdown, Duration::from_millis(1)).contains("loading takes more than 0.001 s")
+        );
         let panics = within(MAX_LOAD, &shutdown, || -> u8 { panic!("on purpose") });
         assert!(panics.is_err());
         shutdown.request();

@@ -181,7 +181,7 @@ mod tests {
         );
         assert_eq!(
             all["qos.map.depth"].text(),
-            "Samples of the topic that are kept."
+            "History depth of the topic, samples."
         );
         assert_eq!(all["frame"].constraint(), "map or odom");
         assert!(

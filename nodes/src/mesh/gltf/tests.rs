@@ -238,7 +238,7 @@ fn many_nodes_of_one_mesh_are_bounded_by_the_triangles() {
     document["scenes"][0]["nodes"] = json!((0..1000).collect::<Vec<_>>());
     let error = read_in(&document, Axes::RosFlu).unwrap_err();
     assert!(
-        error.contains("6 triangles or more, but at most 4"),
+        error.contains("6 triangles or more, more than 4"),
         "{error}"
     );
 }

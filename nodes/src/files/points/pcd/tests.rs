@@ -99,7 +99,7 @@ fn the_truth_about_a_wrong_header_is_told() {
         assert_eq!(found, format!("PCD (ascii) file, line {message}"));
     }
     let zip = with(HEADER, "zip", b"").unwrap_err();
-    assert!(zip.contains("\"DATA zip\" is no line"), "{zip}");
+    assert!(zip.contains("\"DATA zip\" is not a line"), "{zip}");
     let empty = pcd("\n".repeat(2000)).unwrap_err();
     assert!(empty.contains("no DATA in its first 1000 lines"), "{empty}");
 }

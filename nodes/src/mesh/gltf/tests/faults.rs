@@ -31,12 +31,12 @@ pub(super) fn faults() -> Vec<(&'static str, Value, &'static str)> {
         (
             "/nodes/0/extras",
             json!({"label": 65536}),
-            "label 65536 is no whole",
+            "label 65536 is not an integer",
         ),
         (
             "/nodes/0/extras",
             json!({"instance": 0.5}),
-            "instance 0.5 is no whole",
+            "instance 0.5 is not an integer",
         ),
         (
             "/accessors/0/count",
@@ -123,7 +123,7 @@ pub(super) fn faults() -> Vec<(&'static str, Value, &'static str)> {
         (
             "/buffers/0/byteLength",
             json!(u64::MAX),
-            "of all buffers are taken",
+            "so all buffers exceed",
         ),
         ("/buffers/0/uri", json!(null), "no uri"),
         (
