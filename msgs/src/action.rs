@@ -1,4 +1,4 @@
-//! The services and topics that ROS makes of `Calibrate.action`.
+//! Services and topics that ROS derives from `Calibrate.action`.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ use crate::interface::{request_text, response_text};
 use crate::unique_identifier_msgs::UUID;
 use crate::{MessageVisitor, RosMessage, RosService, Schema};
 
-/// An action: a goal that takes its time, with feedback meanwhile and a result at the end.
+/// An action: a long-running goal with feedback and a result.
 pub trait RosAction: Send + 'static {
     /// Type name, such as `lattice_msgs/action/Calibrate`.
     const TYPE: &'static str;
@@ -28,15 +28,15 @@ pub trait RosAction: Send + 'static {
     /// The message of `_action/feedback`.
     type FeedbackMessage: RosMessage;
 
-    /// Takes a request of `send_goal` apart.
+    /// Splits a request of `send_goal`.
     fn goal(request: <Self::SendGoal as RosService>::Request) -> (UUID, Self::Goal);
-    /// Answers it.
+    /// Response of `send_goal`.
     fn accepted(accepted: bool, stamp: Time) -> <Self::SendGoal as RosService>::Response;
-    /// The goal that a request of `get_result` is about.
+    /// Goal id in a request of `get_result`.
     fn wanted(request: &<Self::GetResult as RosService>::Request) -> UUID;
-    /// Answers it; the status is one of `action_msgs/msg/GoalStatus`.
+    /// Response of `get_result`; the status is one of `action_msgs/msg/GoalStatus`.
     fn result(status: i8, result: Self::Result) -> <Self::GetResult as RosService>::Response;
-    /// Tells how far a goal is.
+    /// Feedback message of a goal.
     fn feedback(goal_id: UUID, feedback: Self::Feedback) -> Self::FeedbackMessage;
 }
 
@@ -93,7 +93,7 @@ pub struct CalibrateFeedbackMessage {
 
 const TEXT: &str = include_str!("../action/Calibrate.action");
 
-/// States parts of the action: what follows `Calibrate_` in the name, the text, and the messages
+/// Declares parts of the action: the name after `Calibrate_`, the text, and the messages
 /// that the fields refer to.
 macro_rules! parts {
     ($($part:ident $name:literal $text:expr, [$($dependency:ty),*];)*) => {

@@ -37,30 +37,30 @@ pub struct GoalStatus {
 }
 
 impl GoalStatus {
-    /// Not known.
+    /// Unknown.
     pub const STATUS_UNKNOWN: i8 = 0;
-    /// Waits.
+    /// Waiting.
     pub const STATUS_ACCEPTED: i8 = 1;
-    /// At work.
+    /// In progress.
     pub const STATUS_EXECUTING: i8 = 2;
-    /// About to end early, as asked.
+    /// Cancellation in progress.
     pub const STATUS_CANCELING: i8 = 3;
     /// Done.
     pub const STATUS_SUCCEEDED: i8 = 4;
-    /// Ended early, as asked.
+    /// Canceled.
     pub const STATUS_CANCELED: i8 = 5;
-    /// Ended by the server.
+    /// Aborted by the server.
     pub const STATUS_ABORTED: i8 = 6;
 }
 
 /// States of all goals of an action server.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GoalStatusArray {
-    /// Those at work and those that ended of late.
+    /// Active goals, and recently ended ones.
     pub status_list: Vec<GoalStatus>,
 }
 
-/// Asks to end goals early: the one of the id; all that were accepted by the stamp, if the id is
+/// Cancels goals: the one with the id; all accepted by the stamp, if the id is
 /// zero; both where both are given; all, where neither is.
 #[derive(Clone, Copy, Debug)]
 pub struct CancelGoal;
@@ -77,17 +77,17 @@ pub struct CancelGoalRequest {
 pub struct CancelGoalResponse {
     /// One of the constants.
     pub return_code: i8,
-    /// Those that end early.
+    /// Goals being canceled.
     pub goals_canceling: Vec<GoalInfo>,
 }
 
 impl CancelGoalResponse {
-    /// At least one goal ends early.
+    /// At least one goal is being canceled.
     pub const ERROR_NONE: i8 = 0;
-    /// The server does not want to.
+    /// Rejected by the server.
     pub const ERROR_REJECTED: i8 = 1;
-    /// No such goal.
+    /// Unknown goal.
     pub const ERROR_UNKNOWN_GOAL_ID: i8 = 2;
-    /// Ended before.
+    /// Already ended.
     pub const ERROR_GOAL_TERMINATED: i8 = 3;
 }

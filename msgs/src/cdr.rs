@@ -1,4 +1,4 @@
-//! Messages as bytes on the wire and in bags: CDR with its encapsulation header of four bytes.
+//! CDR encoding of messages, on the wire and in bags, with its encapsulation header of four bytes.
 
 use byteorder::{BigEndian, LittleEndian};
 use serde::{Serialize, de::DeserializeOwned};
@@ -7,13 +7,13 @@ use thiserror::Error;
 /// Encapsulation header of plain CDR, little endian, no options.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 
-/// Padding that a sender may leave after the last field, to a multiple of four.
+/// Largest padding after the last field, to a multiple of four.
 const MAX_PADDING: usize = 3;
 
-/// An error of decoding or encoding a message.
+/// Error of decoding or encoding a message.
 #[derive(Debug, Error)]
 pub enum CdrError {
-    /// Not even a header.
+    /// Missing header.
     #[error("CDR message of {length} bytes; its header alone has 4")]
     NoHeader {
         /// Bytes there are.
@@ -25,8 +25,8 @@ pub enum CdrError {
         /// First two bytes of the header.
         kind: [u8; 2],
     },
-    /// The bytes do not fit the type: a length past the end, a bad bool, text that is not UTF-8.
-    #[error("{length} bytes are no {type_name}: {source}")]
+    /// Data that do not match the type: a length past the end, an invalid bool, or invalid UTF-8.
+    #[error("{length} bytes are not a {type_name}: {source}")]
     Decode {
         /// Rust name of the type.
         type_name: &'static str,
@@ -35,7 +35,7 @@ pub enum CdrError {
         /// Cause.
         source: cdr_encoding::Error,
     },
-    /// The type ends before the bytes do.
+    /// Data longer than the type.
     #[error(
         "{type_name} ends {left} bytes before the {length} bytes of the message do; \
          the sender has another definition of the type"
@@ -48,7 +48,7 @@ pub enum CdrError {
         /// Bytes there are, header included.
         length: usize,
     },
-    /// The value cannot be written.
+    /// The value cannot be encoded.
     #[error("cannot write {type_name} as CDR: {source}")]
     Encode {
         /// Rust name of the type.
@@ -66,7 +66,7 @@ pub enum CdrError {
     },
 }
 
-/// Writes a message, little endian, header included. Fails beyond 4 GiB.
+/// Encodes a message, little endian, header included. Fails beyond 4 GiB.
 pub fn to_vec<T: Serialize>(message: &T) -> Result<Vec<u8>, CdrError> {
     let type_name = std::any::type_name::<T>();
     let mut bytes = Vec::with_capacity(LITTLE_ENDIAN.len() + 2 * size_of::<T>());
@@ -82,10 +82,10 @@ pub fn to_vec<T: Serialize>(message: &T) -> Result<Vec<u8>, CdrError> {
     }
 }
 
-/// Reads a message of either byte order. All bytes must belong to it but for up to 3 of padding.
+/// Decodes a message of either byte order. All bytes must belong to it except up to 3 of padding.
 ///
-/// Safe on hostile bytes: sequences grow with the elements that are really there, so memory stays
-/// within a small multiple of the length of `bytes` whatever lengths it declares.
+/// Safe for untrusted bytes: sequences grow with the elements that are present, so memory is
+/// bounded by a small multiple of the length of `bytes`, for any stated lengths.
 pub fn from_slice<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, CdrError> {
     let (type_name, length) = (std::any::type_name::<T>(), bytes.len());
     let Some((&[high, low, _, _], body)) = bytes.split_first_chunk() else {

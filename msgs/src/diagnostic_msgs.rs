@@ -37,13 +37,13 @@ pub struct DiagnosticStatus {
 }
 
 impl DiagnosticStatus {
-    /// As it should be.
+    /// Normal operation.
     pub const OK: u8 = 0;
-    /// Works, look at it.
+    /// Works, but needs attention.
     pub const WARN: u8 = 1;
     /// Does not work.
     pub const ERROR: u8 = 2;
-    /// Not heard of for too long.
+    /// No recent status.
     pub const STALE: u8 = 3;
 }
 

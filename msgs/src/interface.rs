@@ -8,7 +8,7 @@ use serde::{Serialize, de::DeserializeOwned};
 const SEPARATOR: &str =
     "================================================================================";
 
-/// Schema of one message: its own text, and the schemas of the messages it holds.
+/// Schema of one message: its own text, and the schemas of its dependencies.
 #[derive(Debug)]
 pub struct Schema {
     /// Type name, such as `sensor_msgs/msg/PointCloud2`.
@@ -20,7 +20,7 @@ pub struct Schema {
 }
 
 impl Schema {
-    /// The text followed by those of all dependencies, each once (encoding `ros2msg` of MCAP).
+    /// Text with the texts of all dependencies, each once (encoding `ros2msg` of MCAP).
     pub fn definition(&'static self) -> String {
         let mut seen = vec![self];
         let mut text = self.text.to_owned();
@@ -29,7 +29,7 @@ impl Schema {
             for &dependency in schema.dependencies {
                 if !seen.iter().any(|s| s.type_name == dependency.type_name) {
                     seen.push(dependency);
-                    // As the fields name it, where the middle is left out.
+                    // Named as in the fields, without the middle part.
                     let mut parts = dependency.type_name.split('/');
                     let (package, name) = (parts.next(), parts.next_back());
                     let name = [package, name].map(Option::unwrap_or_default).join("/");
@@ -103,7 +103,7 @@ pub(crate) const fn response_text(text: &'static str) -> &'static str {
     text.split_at(divider(text) + "---\n".len()).1
 }
 
-/// States the messages of a package: for each the name and the messages its fields refer to.
+/// Declares the messages of a package: for each the name and the messages its fields refer to.
 macro_rules! messages {
     ($package:literal in $dir:literal; $($name:ident [$($dependency:ident),*];)*) => {
         $(impl $crate::RosMessage for $name {
@@ -120,7 +120,7 @@ macro_rules! messages {
     };
 }
 
-/// States the services of a package, each half like a message in `messages!`.
+/// Declares the services of a package, each half like a message in `messages!`.
 macro_rules! services {
     ($package:literal in $dir:literal; $($name:ident:
         $request:ident [$($request_dependency:ident),*],

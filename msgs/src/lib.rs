@@ -1,9 +1,9 @@
 //! ROS 2 messages as serde structs.
 //!
 //! One module per ROS package, with the names of ROS; a field named `type` is `type_` here.
-//! The layout is that of Jazzy. [`RosMessage`] knows each message's type name and schema text,
-//! [`cdr`] reads and writes the bytes that are on the wire and in bags. [`hash_of`] is the type hash
-//! (RIHS01) that ROS 2 gives a message of this crate, [`type_hash`] that of any definition.
+//! The layout is that of Jazzy. [`RosMessage`] provides each message's type name and schema text,
+//! [`cdr`] encodes and decodes messages. [`hash_of`] is the type hash
+//! (RIHS01) of a message of this crate, [`type_hash`] that of any definition.
 #![forbid(unsafe_code)]
 
 pub mod action;

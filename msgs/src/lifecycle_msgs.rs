@@ -32,13 +32,13 @@ pub struct State {
 impl State {
     /// No state.
     pub const PRIMARY_STATE_UNKNOWN: u8 = 0;
-    /// Nothing is held.
+    /// No resources are allocated.
     pub const PRIMARY_STATE_UNCONFIGURED: u8 = 1;
-    /// Resources are held; nothing is heard or published.
+    /// Resources are allocated; messages are neither received nor published.
     pub const PRIMARY_STATE_INACTIVE: u8 = 2;
-    /// The node is at work.
+    /// The node is running.
     pub const PRIMARY_STATE_ACTIVE: u8 = 3;
-    /// The node is to be ended.
+    /// The node is to be destroyed.
     pub const PRIMARY_STATE_FINALIZED: u8 = 4;
     /// On the way: configuring.
     pub const TRANSITION_STATE_CONFIGURING: u8 = 10;
@@ -54,25 +54,25 @@ impl State {
     pub const TRANSITION_STATE_ERRORPROCESSING: u8 = 15;
 }
 
-/// A way from one state to another.
+/// Transition between states.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Transition {
     /// Number of the transition.
     pub id: u8,
-    /// Its name, which counts before the number where it is given.
+    /// Its name, which takes precedence over the number if given.
     pub label: String,
 }
 
 impl Transition {
     /// Create.
     pub const TRANSITION_CREATE: u8 = 0;
-    /// Takes up resources.
+    /// Acquires resources.
     pub const TRANSITION_CONFIGURE: u8 = 1;
-    /// Gives resources back.
+    /// Releases resources.
     pub const TRANSITION_CLEANUP: u8 = 2;
-    /// Begins to work.
+    /// Starts operation.
     pub const TRANSITION_ACTIVATE: u8 = 3;
-    /// Ceases to work.
+    /// Stops operation.
     pub const TRANSITION_DEACTIVATE: u8 = 4;
     /// Unconfigured shutdown.
     pub const TRANSITION_UNCONFIGURED_SHUTDOWN: u8 = 5;
@@ -137,7 +137,7 @@ pub struct TransitionDescription {
     pub goal_state: State,
 }
 
-/// A transition that has happened.
+/// A completed transition.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TransitionEvent {
     /// Time of it, ns since 1970.
@@ -157,18 +157,18 @@ pub struct ChangeState;
 /// Request of [`ChangeState`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ChangeStateRequest {
-    /// The transition wanted.
+    /// Requested transition.
     pub transition: Transition,
 }
 
 /// Response of [`ChangeState`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ChangeStateResponse {
-    /// True: the node is in the state wanted.
+    /// True: the transition succeeded.
     pub success: bool,
 }
 
-/// Names the state of a node.
+/// Queries the state of a node.
 #[derive(Clone, Copy, Debug)]
 pub struct GetState;
 
@@ -186,7 +186,7 @@ pub struct GetStateResponse {
     pub current_state: State,
 }
 
-/// Lists the states that a node knows.
+/// Lists the states of a node.
 #[derive(Clone, Copy, Debug)]
 pub struct GetAvailableStates;
 
@@ -204,7 +204,7 @@ pub struct GetAvailableStatesResponse {
     pub available_states: Vec<State>,
 }
 
-/// Lists transitions: those from the state of a node, or all.
+/// Lists transitions: the available ones of a node, or all.
 #[derive(Clone, Copy, Debug)]
 pub struct GetAvailableTransitions;
 

@@ -55,7 +55,7 @@ pub struct Log {
 }
 
 impl Log {
-    /// For who looks for a fault.
+    /// For debugging.
     pub const DEBUG: u8 = 10;
     /// Of interest to the operator.
     pub const INFO: u8 = 20;
@@ -63,7 +63,7 @@ impl Log {
     pub const WARN: u8 = 30;
     /// Something failed.
     pub const ERROR: u8 = 40;
-    /// The node cannot go on.
+    /// The node cannot continue.
     pub const FATAL: u8 = 50;
 }
 

@@ -15,7 +15,7 @@ pub trait MessageVisitor {
     fn visit<M: RosMessage>(&mut self);
 }
 
-/// Shows the visitor every message, and every part of a service or an action, that this crate knows.
+/// Passes every message, and every part of a service or an action, to the visitor.
 pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     action_msgs::visit_messages(visitor);
     action_msgs::visit_services(visitor);
@@ -50,7 +50,7 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     visualization_msgs::visit_messages(visitor);
 }
 
-/// Definition of a message of this crate with all that it depends on (`ros2msg` text).
+/// Definition of a message of this crate with its dependencies (`ros2msg` text).
 pub fn definition_of(ros_type: &str) -> Option<String> {
     struct Find<'a>(&'a str, Option<String>);
     impl MessageVisitor for Find<'_> {

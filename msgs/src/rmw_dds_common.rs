@@ -1,6 +1,6 @@
-//! The graph of nodes, as each participant publishes its part of it.
+//! ROS graph, as published by each participant.
 //!
-//! `G` is the identity: [`Gid`], or one of another length, which distributions before Iron have.
+//! `G` is the GID type: [`Gid`], or one of another length, as in distributions before Iron.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ messages! {
     ParticipantEntitiesInfo [Gid, NodeEntitiesInfo];
 }
 
-/// Identity of an endpoint or a participant.
+/// GID of an endpoint or a participant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Gid {
     /// Its GUID.

@@ -1,4 +1,4 @@
-//! Calls of a player and of a recorder of bags, as rosbag2 has them.
+//! Services of rosbag2's player and recorder.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,7 @@ services! {
     Snapshot: SnapshotRequest [], SnapshotResponse [];
 }
 
-/// States requests and responses without a field.
+/// Declares requests and responses without a field.
 macro_rules! empty {
     ($($of:literal $name:ident),*) => {$(
         #[doc = $of]
@@ -51,15 +51,15 @@ empty! {
     "Request of [`Snapshot`]." SnapshotRequest
 }
 
-/// Holds the log.
+/// Pauses the playback.
 #[derive(Clone, Copy, Debug)]
 pub struct Pause;
 
-/// Goes on with the log.
+/// Resumes the playback.
 #[derive(Clone, Copy, Debug)]
 pub struct Resume;
 
-/// Holds the log, or goes on with it.
+/// Pauses or resumes the playback.
 #[derive(Clone, Copy, Debug)]
 pub struct TogglePaused;
 
@@ -67,7 +67,7 @@ pub struct TogglePaused;
 #[derive(Clone, Copy, Debug)]
 pub struct Stop;
 
-/// Asks whether the log is held.
+/// Queries whether the playback is paused.
 #[derive(Clone, Copy, Debug)]
 pub struct IsPaused;
 
@@ -78,7 +78,7 @@ pub struct IsPausedResponse {
     pub paused: bool,
 }
 
-/// Asks for the rate.
+/// Queries the rate.
 #[derive(Clone, Copy, Debug)]
 pub struct GetRate;
 
@@ -103,11 +103,11 @@ pub struct SetRateRequest {
 /// Response of [`SetRate`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetRateResponse {
-    /// False: not a rate that can be played.
+    /// False: rate out of range.
     pub success: bool,
 }
 
-/// Plays one message of a log that is held.
+/// Plays one message while paused.
 #[derive(Clone, Copy, Debug)]
 pub struct PlayNext;
 
@@ -118,7 +118,7 @@ pub struct PlayNextResponse {
     pub success: bool,
 }
 
-/// Plays several messages of a log that is held, at once.
+/// Plays several messages while paused, at once.
 #[derive(Clone, Copy, Debug)]
 pub struct Burst;
 
@@ -136,7 +136,7 @@ pub struct BurstResponse {
     pub actually_burst: u64,
 }
 
-/// Goes on at another time of the log.
+/// Continues at another time of the log.
 #[derive(Clone, Copy, Debug)]
 pub struct Seek;
 
@@ -150,11 +150,11 @@ pub struct SeekRequest {
 /// Response of [`Seek`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SeekResponse {
-    /// False: not a time of the log.
+    /// False: outside the log.
     pub success: bool,
 }
 
-/// Plays a log that is not being played.
+/// Plays a paused log.
 #[derive(Clone, Copy, Debug)]
 pub struct Play;
 
@@ -176,17 +176,17 @@ pub struct PlayResponse {
     pub success: bool,
 }
 
-/// Goes on recording in a new storage file.
+/// Continues the recording in a new storage file.
 #[derive(Clone, Copy, Debug)]
 pub struct SplitBagfile;
 
-/// Writes what a recorder of snapshots holds.
+/// Writes the buffer of a snapshot recorder.
 #[derive(Clone, Copy, Debug)]
 pub struct Snapshot;
 
 /// Response of [`Snapshot`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SnapshotResponse {
-    /// False: this recorder takes none.
+    /// False: snapshots are not supported.
     pub success: bool,
 }

@@ -45,7 +45,7 @@ pub struct Field {
     pub default_value: String,
 }
 
-/// A type without those that it refers to.
+/// A type without its dependencies.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct IndividualTypeDescription {
     /// Full name.
@@ -54,7 +54,7 @@ pub struct IndividualTypeDescription {
     pub fields: Vec<Field>,
 }
 
-/// A type with all that it refers to.
+/// A type with its dependencies.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TypeDescription {
     /// The type itself.

@@ -15,7 +15,7 @@ use crate::{MessageVisitor, RosMessage, visit_messages};
 
 /// Type hash (`RIHS01_...`) of a message by its definition with all dependencies (`ros2msg` text).
 ///
-/// `None` where the text is not of that kind, or lacks a message that a field refers to.
+/// `None` if the text is malformed, or lacks a message that a field refers to.
 pub fn type_hash(ros_type: &str, definition: &str) -> Option<String> {
     let description = type_description(ros_type, definition)?;
     let main = json(&description.type_description);
@@ -31,7 +31,7 @@ pub fn type_hash(ros_type: &str, definition: &str) -> Option<String> {
     Some(hash)
 }
 
-/// Description of a message by its definition with all dependencies, as [`type_hash`] has it.
+/// Description of a message by its definition with all dependencies, as in [`type_hash`].
 pub fn type_description(ros_type: &str, definition: &str) -> Option<TypeDescription> {
     let [_, kind, _] = ros_type.split('/').collect::<Vec<_>>()[..] else {
         return None;
@@ -96,7 +96,7 @@ impl Hashes {
     }
 }
 
-/// Type hash of a service: rosidl describes it as a message of its request, its response and an event of both.
+/// Type hash of a service: rosidl describes it as a message of its request, response and event.
 fn service_hash(
     service: &str,
     (request, response): (&'static Schema, &'static Schema),
@@ -134,7 +134,7 @@ impl MessageVisitor for Hashes {
 
 /// Full name of a message that a definition calls `Name` or `package/Name`.
 ///
-/// Parts of services and actions, whose names alone hold a `_`, are of the `kind` of what holds them.
+/// Parts of services and actions, the only names with a `_`, have the `kind` of their owner.
 fn full_name(name: &str, package: &str, kind: &str) -> String {
     let (package, last) = name.split_once('/').unwrap_or((package, name));
     match last {
@@ -144,7 +144,7 @@ fn full_name(name: &str, package: &str, kind: &str) -> String {
     }
 }
 
-/// Canonical JSON of one message; default values do not count.
+/// Canonical JSON of one message, without default values.
 fn json(description: &IndividualTypeDescription) -> String {
     let field = |field: &Field| {
         let FieldType {
@@ -164,7 +164,7 @@ fn json(description: &IndividualTypeDescription) -> String {
     format!(r#"{{"type_name": "{name}", "fields": [{fields}]}}"#)
 }
 
-/// Description of one message; the names of those that it holds are added to `nested`.
+/// Description of one message; the names of its dependencies are added to `nested`.
 fn describe(
     type_name: &str,
     text: &str,
@@ -261,7 +261,7 @@ fn field_of(
     })
 }
 
-/// True if JSON holds the name as it is.
+/// True if the name needs no escaping in JSON.
 fn is_plain(name: &str) -> bool {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '/';
     !name.is_empty() && name.chars().all(plain)

@@ -1,6 +1,6 @@
-//! One compute thread with a bounded inbox and a private rayon pool.
+//! Compute thread with a bounded inbox and a private rayon pool.
 //!
-//! Readers hand over and return: a full inbox refuses the newest event, which the caller counts.
+//! Senders never block: a full inbox rejects the newest event, which the caller counts.
 
 use std::io;
 use std::sync::Arc;
@@ -10,30 +10,30 @@ use std::thread::{self, JoinHandle};
 use crossbeam_channel::{Sender, bounded};
 
 use lattice_runtime::Shutdown;
-use lattice_runtime::guarded;
+use lattice_runtime::run_catching_panics;
 
-/// Bounds of a compute thread.
+/// Limits of a compute thread.
 #[derive(Clone, Copy, Debug)]
 pub struct ComputeLimits {
-    /// Most events in the inbox.
+    /// Events in the inbox.
     pub events: usize,
-    /// Most bytes that the events in the inbox may say they have.
+    /// Stated bytes of the events in the inbox.
     pub bytes: usize,
-    /// Threads of the pool; 0: one less than the machine has, at least one.
+    /// Threads of the pool; 0: one less than the number of cores, at least one.
     pub threads: usize,
 }
 
-/// An event with its bytes; `None` ends the work.
+/// An event with its bytes; `None` ends the thread.
 type Item<E> = Option<(E, usize)>;
 
-/// Runs a handler on its own thread until it is finished, or dropped: then without what waits.
+/// Runs a handler on a separate thread until finished. Dropping it discards queued events.
 pub struct Compute<E> {
     inbox: Inbox<E>,
     thread: Option<JoinHandle<()>>,
     dropped: Arc<AtomicBool>,
 }
 
-/// The entrance to a compute thread.
+/// Sender of events to a compute thread.
 pub struct Inbox<E> {
     sender: Sender<Item<E>>,
     bytes: Arc<AtomicUsize>,
@@ -51,8 +51,8 @@ impl<E> Clone for Inbox<E> {
 }
 
 impl<E: Send + 'static> Compute<E> {
-    /// Starts the thread. The handler runs inside the pool, one event at a time, in order; if it
-    /// panics the process is asked to shut down.
+    /// Starts the thread. The handler runs inside the pool, one event at a time, in order; a
+    /// panic requests shutdown of the process.
     pub fn spawn(
         name: &str,
         limits: ComputeLimits,
@@ -78,7 +78,7 @@ impl<E: Send + 'static> Compute<E> {
         let thread = thread::Builder::new()
             .name(format!("{name} compute"))
             .spawn(move || {
-                guarded("compute", &shutdown, || {
+                run_catching_panics("compute", &shutdown, || {
                     while let Ok(Some((event, size))) = receiver.recv() {
                         if stop.load(Ordering::Acquire) {
                             break;
@@ -99,14 +99,14 @@ impl<E: Send + 'static> Compute<E> {
         })
     }
 
-    /// The entrance; clones share it.
+    /// Event sender; clones share the inbox.
     pub fn inbox(&self) -> Inbox<E> {
         self.inbox.clone()
     }
 
-    /// Lets the handler work off what is in the inbox and a last event, then ends the thread.
+    /// Processes the queued events and a last one, then ends the thread.
     pub fn finish_with(mut self, last: E) {
-        // Waits for room where readers could not: nobody reads any more.
+        // Blocks for space, unlike other senders.
         let sender = &self.inbox.sender;
         let sent = sender
             .send(Some((last, 0)))
@@ -119,22 +119,22 @@ impl<E: Send + 'static> Compute<E> {
 }
 
 impl<E> Drop for Compute<E> {
-    /// Ends the thread of a node that did not come to start, whoever holds its inbox.
+    /// Ends the thread of a node that failed to start, even if its inbox is still in use.
     fn drop(&mut self) {
         if self.thread.is_some() {
             self.dropped.store(true, Ordering::Release);
-            // Where there is no room, the next event ends it.
+            // If the inbox is full, the next event ends the thread.
             let _ = self.inbox.sender.try_send(None);
         }
     }
 }
 
 impl<E> Inbox<E> {
-    /// Hands over an event of `bytes`; `false`: the inbox is full, or its worker has ended.
+    /// Sends an event of `bytes`; `false`: the inbox is full, or the thread has ended.
     #[must_use]
     pub fn send(&self, event: E, bytes: usize) -> bool {
         let before = self.bytes.fetch_add(bytes, Ordering::Relaxed);
-        // One event always fits, however large, and those without bytes need no room.
+        // One event always fits an empty inbox, and events without bytes always fit.
         let fits = bytes == 0 || before == 0 || before.saturating_add(bytes) <= self.max_bytes;
         if fits && self.sender.try_send(Some((event, bytes))).is_ok() {
             return true;
@@ -143,8 +143,8 @@ impl<E> Inbox<E> {
         false
     }
 
-    /// A handler that hands each message over as an event of so many bytes, and counts those that
-    /// find no room.
+    /// Handler that sends each message as an event of its size, and counts rejected
+    /// ones.
     pub fn counting<M, F: Fn(M) -> E>(
         &self,
         lost: &Arc<AtomicU64>,

@@ -1,4 +1,4 @@
-//! The Lattice ROS 2 nodes: state machines without I/O, and the shells that connect them to topics.
+//! The Lattice ROS 2 nodes: state machines without I/O, and the ROS nodes around them.
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "bags")]

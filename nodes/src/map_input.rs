@@ -1,4 +1,4 @@
-//! The map as a node hears it: both topics, what is lost of them, and keyframes asked for after that.
+//! Map subscriptions of a node: both topics, their losses, and keyframe requests after a loss.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,15 +8,17 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Empty;
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Load, Losses, Node, Publisher, RuntimeError, Subscription, Undecoded};
+use lattice_runtime::{
+    Losses, Node, Publisher, RuntimeError, Subscription, SubscriptionExecutor, Undecoded,
+};
 
 use crate::compute::Inbox;
 use crate::map_follower::{FollowError, Followed};
 
-/// Counters of messages that did not come to the compute thread.
+/// Counters of messages lost before the compute thread.
 #[derive(Clone, Default)]
 pub struct MapLosses {
-    /// Messages that found the inbox full.
+    /// Messages rejected by a full inbox.
     pub at_inbox: Arc<AtomicU64>,
     before: Losses,
 }
@@ -33,7 +35,7 @@ impl MapLosses {
         self.subscribe_to(node, ["map", "map_updates"], inbox, map, update)
     }
 
-    /// The same of topics with other names.
+    /// Subscribes to topics with other names.
     pub fn subscribe_to<E: Send + 'static>(
         &self,
         node: &Node,
@@ -52,39 +54,48 @@ impl MapLosses {
                 update.bytes(|update| update.keys.len() + update.counts.len() * 10)
             },
         );
-        let maps = node.subscribe_undecoded(map_topic.as_ref(), Qos::MAP, Load::Small, on_map)?;
-        let updates =
-            node.subscribe_undecoded(update_topic.as_ref(), Qos::DELTAS, Load::Small, on_update)?;
+        let maps = node.subscribe_undecoded(
+            map_topic.as_ref(),
+            Qos::MAP,
+            SubscriptionExecutor::Shared,
+            on_map,
+        )?;
+        let updates = node.subscribe_undecoded(
+            update_topic.as_ref(),
+            Qos::DELTAS,
+            SubscriptionExecutor::Shared,
+            on_update,
+        )?;
         self.before.watch([&maps, &updates]);
         node.expect_publishers([&maps], "lattice_mapper", None, |_| true);
         Ok([maps, updates])
     }
 
-    /// Messages lost on the way or at the inbox.
+    /// Messages lost on the network or at the inbox.
     pub fn count(&self) -> u64 {
         self.inbox_full() + self.on_network()
     }
 
-    /// Messages that found the inbox, or the queue before it, full.
+    /// Messages rejected by a full inbox or overrun in its queue.
     pub fn inbox_full(&self) -> u64 {
         self.at_inbox.load(Ordering::Relaxed) + self.before.overrun()
     }
 
-    /// Messages that were sent and did not come.
+    /// Messages lost on the network.
     pub fn on_network(&self) -> u64 {
         self.before.on_network()
     }
 
-    /// Messages that are none.
+    /// Undecodable messages.
     pub fn undecodable(&self) -> u64 {
         self.before.undecodable()
     }
 }
 
-/// Requests of a follower of the map to the mapper, and its words to the operator.
+/// Keyframe requests of a map follower to its mapper, and warnings in the log.
 pub struct MapRequests {
     losses: MapLosses,
-    /// Losses that a keyframe was asked for.
+    /// Losses up to the last keyframe request.
     seen: u64,
     request: Publisher<Empty>,
     refusals: Throttle,
@@ -104,7 +115,7 @@ impl MapRequests {
         })
     }
 
-    /// Does what the outcome of a chunk asks for.
+    /// Handles the outcome of a chunk.
     pub fn followed(&self, result: Option<Result<Followed, FollowError>>) {
         match result {
             Some(Ok(Followed::NeedKeyframe)) => self.ask_for_keyframe(),
@@ -117,7 +128,7 @@ impl MapRequests {
         }
     }
 
-    /// Asks for a keyframe if something has been lost since the call before.
+    /// Requests a keyframe if messages were lost since the last call.
     pub fn make_good(&mut self) {
         let lost = self.losses.count();
         if lost != self.seen {
@@ -126,7 +137,7 @@ impl MapRequests {
         }
     }
 
-    /// Asks for a keyframe, once a second at most.
+    /// Requests a keyframe, at most once a second.
     pub fn ask_for_keyframe(&self) {
         if self.requests.check().is_some()
             && let Err(error) = self.request.publish(Empty::default())
@@ -135,7 +146,7 @@ impl MapRequests {
         }
     }
 
-    /// The losses.
+    /// Loss counters.
     pub fn losses(&self) -> &MapLosses {
         &self.losses
     }

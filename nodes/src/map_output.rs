@@ -1,4 +1,4 @@
-//! A map as a node publishes it: updates, and keyframes in several rounds for whoever asks or joins.
+//! Map publication of a node: updates, and keyframes in several rounds on request.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -8,26 +8,26 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Empty;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Load, Node, Publisher, RuntimeError, Server, Subscription};
+use lattice_runtime::{Node, Publisher, RuntimeError, Server, Subscription, SubscriptionExecutor};
 
-/// Chunks of a keyframe published in one update period: 3 MB.
+/// Keyframe chunks per update period: 3 MB.
 const CHUNKS_PER_ROUND: usize = 50;
 
-/// Publishers of `map` and `map_updates`, and what is still to be published.
+/// Publishers of `map` and `map_updates`, with pending chunks.
 pub struct MapOutput {
     map: Publisher<LatticeMap>,
     updates: Publisher<LatticeMapUpdate>,
-    /// A keyframe was asked for.
+    /// True after a keyframe request.
     asked: Arc<AtomicBool>,
-    /// Chunks of a keyframe that are still to be published.
+    /// Pending chunks of a keyframe.
     pending: VecDeque<Arc<LatticeMap>>,
-    /// Updates lost by the publisher that a keyframe was asked for.
+    /// Lost updates up to the last keyframe for them.
     updates_lost: u64,
-    /// Times that a chunk of a keyframe found the publisher full, and waited.
+    /// Delays of keyframe chunks by a full publisher.
     chunks_waited: u64,
 }
 
-/// Topic and service by which keyframes are asked for, until it is dropped.
+/// Topic and service for keyframe requests; dropping it ends them.
 pub struct KeyframeRequests {
     /// The topic.
     pub topic: Subscription,
@@ -35,7 +35,7 @@ pub struct KeyframeRequests {
 }
 
 impl MapOutput {
-    /// Opens the topics of a node, and the topic and service by which a keyframe is asked for.
+    /// Creates the map topics, and the topic and service for keyframe requests.
     pub fn open(node: &Node) -> Result<(Self, KeyframeRequests), RuntimeError> {
         let output = Self {
             map: node.publisher("map", Qos::MAP)?,
@@ -50,11 +50,16 @@ impl MapOutput {
             move || asked.store(true, Ordering::Relaxed)
         };
         output.map.on_subscriber_joined(ask());
-        // By topic too: our own followers need no answer, and the topic passes inside a process.
+        // Also by topic: our followers need no reply, and the topic is delivered within a process.
         let (by_topic, by_call) = (ask(), ask());
         let heard = move |_: Arc<Empty>| by_topic();
         let requests = KeyframeRequests {
-            topic: node.subscribe("~/request_keyframe", Qos::DEFAULT, Load::Small, heard)?,
+            topic: node.subscribe(
+                "~/request_keyframe",
+                Qos::DEFAULT,
+                SubscriptionExecutor::Shared,
+                heard,
+            )?,
             _service: node.service_trigger("~/request_keyframe", move || {
                 by_call();
                 (true, "keyframe follows".into())
@@ -63,13 +68,13 @@ impl MapOutput {
         Ok((output, requests))
     }
 
-    /// Shows followers the map of a new epoch.
+    /// Starts a keyframe for the map of a new epoch.
     pub fn replaced(&mut self) {
         self.pending.clear();
         self.asked.store(true, Ordering::Relaxed);
     }
 
-    /// Publishes an update, and a round of a keyframe where one was asked for or an update was lost.
+    /// Publishes an update, and a round of a keyframe after a request or a lost update.
     pub fn publish(
         &mut self,
         update: Vec<LatticeMapUpdate>,
@@ -80,7 +85,7 @@ impl MapOutput {
                 log::debug!("update not published: {error}");
             }
         }
-        // Also those that were taken and then found no reader that keeps up.
+        // Includes updates dropped later for a slow reader.
         let lost = self.updates.dropped();
         if lost != self.updates_lost {
             self.updates_lost = lost;
@@ -89,7 +94,7 @@ impl MapOutput {
         if self.pending.is_empty() && self.asked.swap(false, Ordering::Relaxed) {
             self.pending = keyframe().into_iter().map(Arc::new).collect();
         }
-        // A large map takes several rounds: readers and queues are not flooded.
+        // A large map takes several rounds, so that readers and queues are not flooded.
         for _ in 0..CHUNKS_PER_ROUND {
             let Some(chunk) = self.pending.front() else {
                 break;
@@ -102,7 +107,7 @@ impl MapOutput {
         }
     }
 
-    /// Chunks of a keyframe that are still to be published.
+    /// Pending chunks of a keyframe.
     pub fn pending(&self) -> usize {
         self.pending.len()
     }
@@ -113,18 +118,18 @@ impl MapOutput {
         self.updates.flush(Duration::from_secs(2));
     }
 
-    /// Updates that were not published.
+    /// Updates not published.
     pub fn updates_lost(&self) -> u64 {
         self.updates.dropped()
     }
 
-    /// Chunks of keyframes that the publisher took and did not send.
+    /// Keyframe chunks queued but not sent.
     pub fn chunks_lost(&self) -> u64 {
         self.map.dropped().saturating_sub(self.chunks_waited)
     }
 }
 
-/// Epochs of one map after another differ, those of restarted nodes too.
+/// Unique epoch, also across restarts.
 pub fn epoch() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(1, |since| since.as_nanos() as u64)

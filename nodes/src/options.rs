@@ -1,4 +1,4 @@
-//! Parameters that several nodes read alike: frames, words, bounds of threads and inboxes.
+//! Common parameters of several nodes: frames, words, limits of threads and inboxes.
 
 use std::time::Duration;
 
@@ -6,33 +6,33 @@ use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
 use nalgebra::Vector3;
 
-/// Parameters that several nodes have.
+/// Common parameters of several nodes.
 pub const COMMON: &[About] = about! {
     "map_frame" fixed(FRAME): "Frame of the map (x east, y north, z up where it comes from an INS).";
     "threads" fixed("the pool is made with it"): "Threads of the compute pool; 0: one less than the machine has.";
-    "inbox_events" fixed(INBOX): "Most messages that wait for the compute thread.";
-    "inbox_bytes" fixed(INBOX): "Most bytes of messages that wait for the compute thread.";
+    "inbox_events" fixed(INBOX): "Limit of messages queued for the compute thread.";
+    "inbox_bytes" fixed(INBOX): "Limit of message bytes queued for the compute thread.";
     "report_file" fixed("it names an output"): "File for a report in JSON at the end; empty: none.";
-    "mapper" fixed("it names a topic"): "Node that is asked for a keyframe when a part of the map was lost.";
-    "label_low_16_bits": "Whether only the low 16 of labels of 32 bits are the class (SemanticKITTI: the others are the instance).";
-    "ignored_labels": "Classes that say nothing, as 0 in SemanticKITTI.";
-    "palette_rgb_class": "Classes of colours, for clouds whose labels are the colours semantic_color, semantic_color1 to 3 or rgb, and for images of colours: red, green, blue, class, and so on.";
+    "mapper" fixed("it names a topic"): "Node that receives keyframe requests after a loss of map messages.";
+    "label_low_16_bits": "Whether only the low 16 bits of 32-bit labels are the class (SemanticKITTI: the high bits are the instance).";
+    "ignored_labels": "Classes treated as unlabelled, such as 0 in SemanticKITTI.";
+    "palette_rgb_class": "Classes of colours, for clouds labelled by the colours semantic_color, semantic_color1 to 3 or rgb, and for colour masks: red, green, blue, class, and so on.";
 };
 
-/// Reason for which frames do not change.
+/// Reason why frames are read-only.
 pub const FRAME: &str = "others know it by now";
-/// Reason for which topics do not change.
+/// Reason why topics are read-only.
 pub const TOPIC: &str = "it is subscribed to";
 const INBOX: &str = "the inbox is made with it";
 
-/// Most events of an inbox that a parameter may ask for: room is made for all of them at once.
+/// Largest settable number of inbox events: memory is reserved for all of them.
 const MAX_EVENTS: usize = 1 << 18;
-/// Most threads of a pool that a parameter may ask for.
+/// Largest settable number of pool threads.
 const MAX_THREADS: usize = 256;
-/// Smallest chunks of a message that hold their header and some voxels.
+/// Smallest chunk size that fits a header and some voxels.
 const MIN_CHUNK_BYTES: usize = 2048;
 
-/// The name of a frame, without leading slashes.
+/// Reads a frame name and removes leading slashes.
 pub fn frame(params: &Params, name: &str, default: &str) -> Result<String, ParamError> {
     let frame = params.string(name, default)?;
     match frame.trim_start_matches('/') {
@@ -41,7 +41,7 @@ pub fn frame(params: &Params, name: &str, default: &str) -> Result<String, Param
     }
 }
 
-/// One of several words; the first is the default.
+/// Reads one of several words; the first is the default.
 pub fn one_of<T: Copy>(params: &Params, name: &str, words: &[(&str, T)]) -> Result<T, ParamError> {
     let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
     let place = params.word(name, &known)?;
@@ -49,28 +49,28 @@ pub fn one_of<T: Copy>(params: &Params, name: &str, words: &[(&str, T)]) -> Resu
     found.ok_or_else(|| params.invalid(name, "there are no words to choose from"))
 }
 
-/// `inbox_events`: most events that wait for a node.
+/// `inbox_events`: limit of queued events of a node.
 pub fn inbox_events(params: &Params, default: usize) -> Result<usize, ParamError> {
     params.usize_in("inbox_events", default, 1..=MAX_EVENTS)
 }
 
-/// `inbox_bytes`: most bytes of messages that wait for a node.
+/// `inbox_bytes`: limit of queued bytes of a node.
 pub fn inbox_bytes(params: &Params, default: usize) -> Result<usize, ParamError> {
     params.positive("inbox_bytes", default)
 }
 
-/// `threads`: threads of a pool; 0: one less than the machine has.
+/// `threads`: threads of a pool; 0: one less than the number of cores.
 pub fn threads(params: &Params, default: usize) -> Result<usize, ParamError> {
     params.usize_in("threads", default, 0..=MAX_THREADS)
 }
 
-/// A time between two events, in seconds.
+/// Reads a period in seconds.
 pub fn period(params: &Params, name: &str, default_s: f64) -> Result<Duration, ParamError> {
     let seconds = params.f64_in(name, default_s, 0.01..=86_400.0)?;
     Ok(Duration::from_secs_f64(seconds))
 }
 
-/// A place, metres; the origin if not given.
+/// Reads a position in metres; the origin by default.
 pub fn place_m(params: &Params, name: &str) -> Result<Vector3<f64>, ParamError> {
     match params.f64_array(name, &[0.0; 3])?[..] {
         [x, y, z] => Ok(Vector3::new(x, y, z)),
@@ -78,7 +78,7 @@ pub fn place_m(params: &Params, name: &str) -> Result<Vector3<f64>, ParamError> 
     }
 }
 
-/// `chunk_bytes`: largest serialised message.
+/// `chunk_bytes`: largest serialized message.
 pub fn chunk_bytes(params: &Params, default: usize) -> Result<usize, ParamError> {
     params.usize_in("chunk_bytes", default, MIN_CHUNK_BYTES..=1 << 26)
 }

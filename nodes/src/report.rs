@@ -1,4 +1,4 @@
-//! Reports of nodes: JSON files that they write at their end, and the same numbers as diagnostics.
+//! Final reports of nodes as JSON files, and their numbers as diagnostics.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -7,12 +7,12 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::files::whole::{self, WholeFile};
+use crate::files::atomic_write::{self, AtomicFile};
 use crate::start::NodeError;
 use lattice_runtime::Diagnostics;
 use lattice_runtime::params::{ParamError, Params};
 
-/// The numbers of a report as diagnostics show them, one level.
+/// Values of a report as diagnostic keys and values, flattened.
 pub fn key_values(report: &impl Serialize) -> Vec<(String, String)> {
     fn walk(name: &str, value: &serde_json::Value, out: &mut Vec<(String, String)>) {
         match value {
@@ -31,20 +31,20 @@ pub fn key_values(report: &impl Serialize) -> Vec<(String, String)> {
     out
 }
 
-/// `report_file`: path of a report; one that cannot be written is refused.
+/// `report_file`: path of a report; an error if it cannot be written.
 pub fn file(params: &Params) -> Result<String, ParamError> {
     let name = "report_file";
     let path = params.string(name, "")?;
     if path.is_empty() {
         return Ok(path);
     }
-    match WholeFile::create(Path::new(&path)) {
+    match AtomicFile::create(Path::new(&path)) {
         Ok(_) => Ok(path),
         Err(error) => Err(params.invalid(name, format!("{path:?}: {error}"))),
     }
 }
 
-/// A report as it is written.
+/// Report with the transport losses.
 #[derive(Serialize)]
 struct WithLosses<'a, R> {
     #[serde(flatten)]
@@ -53,7 +53,7 @@ struct WithLosses<'a, R> {
     transport: BTreeMap<String, u64>,
 }
 
-/// Writes a report as JSON where a path is given; under `transport` what its process has lost, if anything.
+/// Writes a report as JSON if a path is given, with transport losses, if any, under `transport`.
 pub fn write(
     path: &str,
     report: &impl Serialize,
@@ -64,10 +64,10 @@ pub fn write(
     }
     let transport = diagnostics.losses().into_iter().collect();
     let text = serde_json::to_string_pretty(&WithLosses { report, transport })?;
-    whole::write_text(Path::new(path), &(text + "\n"))
+    atomic_write::write_text(Path::new(path), &(text + "\n"))
 }
 
-/// Reads a report that [`write()`] wrote.
+/// Reads a report written by [`write()`].
 pub fn read<T: for<'de> Deserialize<'de>>(path: &Path) -> io::Result<T> {
     let text = fs::read_to_string(path)?;
     serde_json::from_str(&text).map_err(io::Error::other)

@@ -1,4 +1,4 @@
-//! Nodes of a process at work, and those that others manage.
+//! Running nodes of a process, managed ones included.
 
 use lattice_runtime::Runtime;
 use lattice_runtime::lifecycle::{ChangeRequests, Lifecycle, Step};
@@ -6,27 +6,27 @@ use lattice_runtime::params::Params;
 
 use crate::start::{Declare, Finish, NodeError, Servers, Start, check_topics};
 
-/// The nodes of a process, in the order in which data flows.
+/// Nodes of a process in the order of data flow.
 #[derive(Default)]
 pub struct Running {
     nodes: Vec<OneNode>,
     requests: ChangeRequests,
 }
 
-/// A node, which is at work if it can be finished.
+/// A node; it is active if it can be finished.
 struct OneNode {
     name: String,
     start: Start,
     declare: Option<Declare>,
     finish: Option<Finish>,
-    /// Of a managed node.
+    /// Lifecycle of a managed node.
     lifecycle: Option<Lifecycle>,
 }
 
 impl Running {
-    /// Starts a node; one whose parameter `managed` is true waits to be configured and activated.
+    /// Starts a node; one with the parameter `managed` waits to be configured and activated.
     ///
-    /// Until then its parameters can be set, which `declare` reads.
+    /// Until then its parameters can be set; `declare` declares them.
     pub fn start(
         &mut self,
         runtime: &Runtime,
@@ -49,7 +49,7 @@ impl Running {
         match one.lifecycle {
             Some(_) => {
                 if let Some(Err(error)) = declare.map(|declare| declare(node.params())) {
-                    log::warn!("{name} cannot be configured until this is mended: {error}");
+                    log::warn!("{name} cannot be configured until this is corrected: {error}");
                 }
                 one.wait(runtime);
             }
@@ -59,8 +59,8 @@ impl Running {
         Ok(())
     }
 
-    /// Serves managed nodes until the end is asked for, lets each node work off its inbox and publish the
-    /// rest, and leaves.
+    /// Serves managed nodes until a shutdown request, then lets each node process its inbox, publish the
+    /// results and end.
     pub fn until_stopped(mut self, runtime: &Runtime) -> Result<(), NodeError> {
         self.check_topics(runtime)?;
         while let Some(change) = self.requests.next(&runtime.shutdown_handle()) {
@@ -72,7 +72,7 @@ impl Running {
             }
         }
         self.requests.end();
-        // In the order in which data flows, so that each still gets what the one before publishes.
+        // In the order of data flow, so that each node receives the last messages of its predecessor.
         let mut servers = Vec::new();
         for node in &mut self.nodes {
             runtime.work_off();
@@ -81,11 +81,11 @@ impl Running {
         Ok(runtime.spin()?)
     }
 
-    /// Refuses parameters of topics that no node has.
+    /// Rejects `qos` parameters of topics that no node has.
     fn check_topics(&self, runtime: &Runtime) -> Result<(), NodeError> {
         let nodes = self.nodes.iter().map(|node| runtime.node(&node.name));
         let nodes = nodes.collect::<Result<Vec<_>, _>>()?;
-        // A managed node has no topics yet.
+        // An unconfigured managed node has no topics yet.
         let waits = self.nodes.iter().any(|node| node.finish.is_none());
         let has = |name: &str| waits || nodes.iter().any(|node| node.params().has(name));
         let at_work = self.nodes.iter().zip(&nodes);
@@ -97,7 +97,7 @@ impl Running {
 }
 
 impl OneNode {
-    /// Lets parameters be set while the node is not configured: they are checked now and used then.
+    /// Makes parameters settable while the node is not configured: they are checked now and used later.
     fn wait(&self, runtime: &Runtime) {
         if let (Ok(node), Some(declare)) = (runtime.node(&self.name), self.declare) {
             let check = move |wanted: &Params| declare(wanted).map_err(|error| error.to_string());
@@ -105,14 +105,14 @@ impl OneNode {
         }
     }
 
-    /// Lets no parameters be set: what is being read or is to go does not change.
+    /// Makes parameters read-only while they are read or the node ends.
     fn freeze(&self, runtime: &Runtime) {
         if let Ok(node) = runtime.node(&self.name) {
             node.params().close();
         }
     }
 
-    /// Ends the node if it is at work.
+    /// Ends an active node.
     fn end(&mut self, runtime: &Runtime) -> Option<Servers> {
         let finish = self.finish.take()?;
         self.freeze(runtime);

@@ -1,19 +1,19 @@
-//! Stamps held against their neighbours, so that a single wrong one moves no clock.
+//! Check of stamps against their predecessors, so that a single wrong stamp does not move a clock.
 
-/// Lets stamps pass that are near the one before; one that jumps is refused until several in a row agree
-/// on the new time, as those of a log that loops do.
+/// Passes stamps near the previous one. A jump is rejected until several stamps in a row agree
+/// on the new time, as in a looping log.
 #[derive(Clone, Debug)]
 pub struct StampGate {
     back_ns: i64,
     ahead_ns: i64,
     agreeing: u32,
     last_ns: Option<i64>,
-    /// Last of the stamps in a row that were refused, and their number.
+    /// Last consecutive rejected stamp, and the number of them.
     refused: Option<(i64, u32)>,
 }
 
 impl StampGate {
-    /// A gate for steps of at most so much; of stamps beyond them the `agreeing`th in a row passes.
+    /// Gate for bounded steps; beyond the bounds the `agreeing`th stamp in a row passes.
     pub fn new(back_ns: i64, ahead_ns: i64, agreeing: u32) -> Self {
         Self {
             back_ns,
@@ -24,12 +24,12 @@ impl StampGate {
         }
     }
 
-    /// True until a stamp has passed: the next is held against nothing.
+    /// True until a stamp has passed: the next one is not checked.
     pub fn is_new(&self) -> bool {
         self.last_ns.is_none()
     }
 
-    /// True if a stamp is to be believed.
+    /// True if a stamp is accepted.
     pub fn passes(&mut self, stamp_ns: i64) -> bool {
         let near = |at_ns: i64| {
             let step_ns = stamp_ns.saturating_sub(at_ns);
@@ -39,7 +39,7 @@ impl StampGate {
             (self.last_ns, self.refused) = (Some(stamp_ns), None);
             return true;
         };
-        // Steps wider than the limits agree too where they are small against the jump: a slow sensor.
+        // Steps beyond the limits agree if they are small against the jump: a slow sensor.
         let run = match self.refused {
             Some((at_ns, run)) if stamp_ns.abs_diff(at_ns) < stamp_ns.abs_diff(last_ns) => run + 1,
             _ => 1,
@@ -52,7 +52,7 @@ impl StampGate {
         true
     }
 
-    /// Forgets all stamps.
+    /// Drops all stamps.
     pub fn clear(&mut self) {
         (self.last_ns, self.refused) = (None, None);
     }

@@ -1,4 +1,4 @@
-//! Contract between a node and the executable that starts it.
+//! Interface between a node and its executable.
 
 use std::any::Any;
 use std::error::Error;
@@ -6,23 +6,23 @@ use std::error::Error;
 use lattice_runtime::Runtime;
 use lattice_runtime::params::{ParamError, Params};
 
-/// Any error that keeps a node from starting.
+/// Error of starting a node.
 pub type NodeError = Box<dyn Error + Send + Sync>;
 
-/// A node that is at work; calling it ends the node after it has worked off its inbox.
+/// A running node; calling it ends the node after processing its inbox.
 pub type Finish = Box<dyn FnOnce() -> Servers>;
 
-/// Servers of a node that has ended. They may have answers to send: kept until the runtime has left.
+/// Servers of an ended node. They may have pending replies: kept until the runtime is closed.
 pub type Servers = Box<dyn Any>;
 
 /// Starts a node on a runtime under its name.
 pub type Start = fn(&Runtime, &str) -> Result<Finish, NodeError>;
 
-/// Reads all parameters of a node, as its start does.
+/// Declares all parameters of a node, as at its start.
 pub type Declare = fn(&Params) -> Result<(), ParamError>;
 
-/// Lets parameters be changed: `apply` is given all as they would be, and hands them to the node or says why
-/// not.
+/// Makes parameters settable: `apply` receives all candidate values, and passes them to the node or returns
+/// the reason for rejecting them.
 pub fn open_params(
     params: &Params,
     apply: impl FnMut(&Params) -> Result<(), String> + Send + 'static,
@@ -30,22 +30,22 @@ pub fn open_params(
     params.open(apply);
 }
 
-/// Most edits between the name of a topic and its misspelling.
+/// Edit distance limit between a topic name and its misspelling.
 const MAX_EDITS: usize = 2;
 
-/// Refuses parameters `qos.TOPIC.*` whose topic is a misspelling of one that the started node has, and warns of
-/// those of other topics: some nodes make topics later. `elsewhere` tells which another node of the process has.
+/// Rejects parameters `qos.TOPIC.*` whose topic is a misspelling of one of the started node, and warns about
+/// those of other topics: some nodes create topics later. `elsewhere` is true for topics of other nodes in the process.
 pub fn check_topics(params: &Params, elsewhere: impl Fn(&str) -> bool) -> Result<(), ParamError> {
     let node = params.node().trim_start_matches('/');
     for unknown in params.without_topic() {
-        // For all nodes: of one that has it, or in a file that others share.
+        // Addressed to all nodes: valid for another node, or in a shared file.
         if !unknown.named && (unknown.place.is_some() || elsewhere(&unknown.name)) {
             continue;
         }
         let nearest = params.nearest(&unknown.name);
         let nearest = nearest.filter(|(_, edits)| *edits <= MAX_EDITS);
         let name = nearest.as_ref().map(|(name, _)| &**name);
-        let error = unknown.error(node, name, "the node has no such topic by now");
+        let error = unknown.error(node, name, "the node has no such topic yet");
         match name {
             Some(_) => return Err(error),
             None => log::warn!("{error}"),
@@ -54,7 +54,7 @@ pub fn check_topics(params: &Params, elsewhere: impl Fn(&str) -> bool) -> Result
     Ok(())
 }
 
-/// Answer to a change of parameters that has been handed over, or has found the inbox full.
+/// Result of a parameter change sent to the inbox.
 pub fn handed_over(sent: bool) -> Result<(), String> {
     match sent {
         true => Ok(()),

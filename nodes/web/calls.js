@@ -1,10 +1,10 @@
-// Questions to nodes, in the worker: calls of services and parameters over the socket.
+// Requests to nodes, in the worker: service calls and parameters over the socket.
 
 const CALL = 2;
 const RESPONSE = 3;
 const CDR = new TextEncoder().encode("cdr");
 
-// Text messages that are of no concern elsewhere; true if this was one.
+// Handles text messages of services and parameters; true if handled.
 export function takeText(message) {
   if (message.op === "advertiseServices") {
     postMessage({ type: "services", services: message.services.map(({ id, name, type }) => ({ id, name, kind: type })) });
@@ -16,7 +16,7 @@ export function takeText(message) {
   return true;
 }
 
-// The answer to a call; true if it was one.
+// Handles a service response; true if it is one.
 export function takeData(bytes) {
   if (bytes[0] !== RESPONSE || bytes.length < 13) return false;
   const view = new DataView(bytes.buffer);
@@ -25,7 +25,7 @@ export function takeData(bytes) {
   return true;
 }
 
-// Sends what the page asks; true if it was that.
+// Sends a request of the page; true if it is one.
 export function ask(socket, data) {
   if (data.type === "call") {
     const bytes = new Uint8Array(13 + CDR.length + data.request.length);

@@ -1,31 +1,31 @@
-// Where the scene is seen from: around a target, at a distance.
+// Camera: an orbit around a target.
 
 import { add, clamp, cross, dot, multiply, scale, sub } from "./math.js";
 
 const FIELD_OF_VIEW = 0.9;
-// Room around a map that the view is fitted to.
+// Margin of a fitted view around the map.
 const MARGIN = 1.12;
 
 export class Camera {
   constructor() {
     this.target = [0, 0, 0];
     this.distance = 40;
-    // Direction from the target to the eye: around the vertical, and above the horizon.
+    // Direction from the target to the eye: azimuth, and elevation above the horizon.
     this.yaw = -2.2;
     this.pitch = 0.6;
     // free, follow, top or side.
     this.mode = "free";
-    // True until a person moves it: the view then fits the map.
+    // True until the user moves the camera: the view then fits the map.
     this.automatic = true;
     this.width = 1;
     this.height = 1;
-    // Middle of the view right of the middle of the screen, as a share of its half: beside the panel.
+    // Horizontal offset of the view's centre, as a fraction of half the screen: beside the panel.
     this.aside = 0;
-    // The same upwards: above the panel of a narrow window.
+    // Vertical offset: above the panel of a narrow window.
     this.above = 0;
   }
 
-  // Unit vectors of the view: to the right, up, and back to the eye.
+  // Unit vectors of the view: right, up, and back to the eye.
   axes() {
     const [cy, sy, cp, sp] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
     const back = [cp * cy, cp * sy, sp];
@@ -38,7 +38,7 @@ export class Camera {
   // Pixels of a length of 1 m at a distance of 1 m.
   focal() { return this.height / 2 / Math.tan(FIELD_OF_VIEW / 2); }
 
-  // From coordinates of the map relative to the eye to those of the screen.
+  // Projection from map coordinates relative to the eye to the screen.
   clip() {
     const { right, up, back } = this.axes();
     const view = new Float32Array([
@@ -60,7 +60,7 @@ export class Camera {
 
   near() { return clamp(this.distance * 0.02, 0.05, 20); }
 
-  // From a place on the screen (-1 to 1, and 1) to the direction seen there.
+  // Viewing direction of a screen position (-1 to 1).
   rays() {
     const { right, up, back } = this.axes();
     const t = Math.tan(FIELD_OF_VIEW / 2);
@@ -80,7 +80,7 @@ export class Camera {
     if (this.mode === "follow") this.mode = "free";
     const { right, up, back } = this.axes();
     const s = this.distance / this.focal();
-    // Along the ground, unless the view is from the side.
+    // Along the ground, except in the side view.
     const flat = Math.abs(back[2]) < 0.3 ? up : cross([0, 0, 1], right);
     this.target = add(this.target, add(scale(right, -dx * s), scale(flat, dy * s)));
   }
@@ -98,7 +98,7 @@ export class Camera {
     if (mode === "free") this.pitch = clamp(this.pitch, 0.35, 1.2);
   }
 
-  // Shows a box, from its lowest to its highest corner.
+  // Fits the view to a box, given by its lowest and highest corner.
   fit(low, high) {
     this.target = scale(add(low, high), 0.5);
     const { right, up, back } = this.axes();
@@ -112,7 +112,7 @@ export class Camera {
     this.distance = clamp(distance, 3, 20000);
   }
 
-  // Place of a point on the screen in pixels from its upper left corner, and its depth in m.
+  // Screen position of a point in pixels from the upper left corner, and its depth in m.
   project(point) {
     const p = sub(point, this.eye());
     const m = this.clip();

@@ -1,4 +1,4 @@
-// Reader of CDR: the bytes of a ROS message, behind their encapsulation header of four bytes.
+// CDR reader: the body of a ROS message, after its encapsulation header of four bytes.
 
 const HEADER = 4;
 const text = new TextDecoder();
@@ -14,7 +14,7 @@ export class Reader {
     this.at = HEADER;
   }
 
-  // Offset of the next value of so many bytes, which begins at a multiple of them.
+  // Offset of the next value of `size` bytes, aligned to its size.
   take(size, align = size) {
     const at = Math.ceil((this.at - HEADER) / align) * align + HEADER;
     this.at = at + size;
@@ -32,7 +32,7 @@ export class Reader {
   string() {
     const length = this.u32();
     const at = this.take(length, 1);
-    // Without the zero at its end.
+    // Without the terminating zero.
     return text.decode(this.slice(at, Math.max(0, length - 1)));
   }
 
@@ -48,7 +48,7 @@ export class Reader {
 
   f64s(count) { return Array.from({ length: count }, () => this.f64()); }
 
-  // A sequence of numbers of 2 or 4 bytes as a typed array.
+  // A sequence of 2-byte or 4-byte numbers as a typed array.
   numbers(type) {
     const count = this.u32();
     const size = type.BYTES_PER_ELEMENT;
@@ -59,7 +59,7 @@ export class Reader {
     return new type(swapped.buffer).reverse();
   }
 
-  // A sequence; `least` is the fewest bytes that one element takes.
+  // A sequence; `least` is the smallest size of an element in bytes.
   list(read, least) {
     const count = this.u32();
     if (count * least > this.bytes.byteLength - this.at) throw new RangeError("a list ends too early");

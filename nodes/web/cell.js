@@ -1,4 +1,4 @@
-// Shape of the cells of a lattice, from its generator: the Voronoi cell as slabs, pairs of parallel faces.
+// Cell shape of a lattice from its generator: the Voronoi cell as slabs, pairs of parallel faces.
 
 import { add, dot, length, rotate, scale } from "./math.js";
 
@@ -7,7 +7,7 @@ export function basisInMap({ generator: g, place }) {
   return [0, 1, 2].map((k) => rotate(place.rotation, [g[k], g[3 + k], g[6 + k]]));
 }
 
-// Four vectors of sum 0 whose dot products are not positive, which span the lattice (Selling 1874).
+// Obtuse superbase: four vectors of sum 0 with non-positive dot products, which span the lattice (Selling 1874).
 function obtuseSuperbase(basis) {
   const b = [...basis, scale(add(add(basis[0], basis[1]), basis[2]), -1)];
   const tiny = 1e-9 * Math.max(...basis.map((v) => dot(v, v)));
@@ -28,12 +28,12 @@ function obtuseSuperbase(basis) {
 }
 
 // Slabs of the cell around the origin: unit normals with half the distance of their faces, m; and the
-// radius of a ball that holds the cell.
+// radius of a bounding ball.
 export function cellShape(basis) {
   const [a, b, c, d] = obtuseSuperbase(basis);
   const candidates = [a, b, c, d, add(a, b), add(a, c), add(b, c)];
   const both = candidates.flatMap((v) => [v, scale(v, -1)]);
-  // A face is there if its middle is nearer to the two cells it parts than to any other.
+  // A face exists if its centre is closer to its two cells than to any other.
   const isFace = (v) => both.every((u) => {
     const same = Math.abs(Math.abs(dot(u, v)) - dot(v, v)) < 1e-9 * dot(v, v) && Math.abs(dot(u, u) - dot(v, v)) < 1e-9 * dot(v, v);
     return same || dot(u, u) - dot(u, v) > 1e-9 * dot(v, v);
@@ -42,7 +42,7 @@ export function cellShape(basis) {
   return { slabs, radius: radius(slabs) };
 }
 
-// Farthest corner of the slabs: every three planes meet in one, if it is within all others.
+// Farthest vertex of the slabs: three planes intersect in one if it is within all others.
 function radius(slabs) {
   let farthest = 0;
   const planes = slabs.flatMap(({ normal, half }) => [{ normal, half }, { normal: scale(normal, -1), half }]);

@@ -1,4 +1,4 @@
-// Palettes: colours between which a value is shown, from its lowest to its highest.
+// Colour maps.
 
 export const FREE_COLOUR = "#7fd8a0";
 
@@ -24,10 +24,10 @@ export function paletteBytes(name) {
   return bytes;
 }
 
-// The palette as the background of a legend.
+// CSS gradient of the colour map for a legend.
 export const gradient = (name) => `linear-gradient(90deg, ${(PALETTES[name] ?? PALETTES.height).join(", ")})`;
 
-// Colour of a label, as the shader makes it.
+// Colour of a label, equal to that of the shader.
 export function labelColour(label) {
   const hue = ((label * 0.61803399) % 1) * 6;
   const mixed = [0, 4, 2].map((shift) => {

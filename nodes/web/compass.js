@@ -1,4 +1,4 @@
-// Axes of the map and a scale bar, on the page and in saved pictures.
+// Map axes and a scale bar, on the page and in saved images.
 
 import { dot } from "./math.js";
 
@@ -6,7 +6,7 @@ import { dot } from "./math.js";
 const AXES = [["E", [1, 0, 0], "--east"], ["N", [0, 1, 0], "--north"], ["up", [0, 0, 1], "--up"]];
 const LONGEST_BAR = 120;
 
-// A round length whose bar is at most so many pixels long, and that of the bar, at the middle of the view.
+// Largest round length whose bar has at most so many pixels, with that of the bar, at the centre of the view.
 export function scaleBar(pixelsOfMetre, longest = LONGEST_BAR) {
   const most = longest / pixelsOfMetre;
   const ten = 10 ** Math.floor(Math.log10(most));
@@ -14,10 +14,10 @@ export function scaleBar(pixelsOfMetre, longest = LONGEST_BAR) {
   return { length, pixels: length * pixelsOfMetre };
 }
 
-// A length in the unit that suits it.
+// Formats a length with a suitable unit.
 export const lengthText = (m) => (m >= 1000 ? `${m / 1000} km` : m >= 1 ? `${m} m` : m >= 0.01 ? `${+(m * 100).toPrecision(2)} cm` : `${+(m * 1000).toPrecision(2)} mm`);
 
-// Paints both into the lower right corner of an area; `ratio`: pixels of the view to those of the area.
+// Draws both into the lower right corner of an area; `ratio`: view pixels per area pixel.
 export function paintCompass(ctx, { width, height, camera, ratio, grid, css }) {
   const { right, up, back } = camera.axes();
   const [x, y, size] = [width - 66, height - 80, 34];
@@ -31,7 +31,7 @@ export function paintCompass(ctx, { width, height, camera, ratio, grid, css }) {
     ctx.strokeText(text, left, top);
     ctx.fillText(text, left, top);
   };
-  // The one that points away first.
+  // Axes that point away from the eye first.
   const seen = AXES.map(([name, along, ink]) => ({ name, ink, dx: dot(along, right), dy: -dot(along, up), depth: dot(along, back) }));
   for (const { name, ink, dx, dy } of seen.sort((a, b) => a.depth - b.depth)) {
     for (const [colour, wide] of [[ground, 5], [css(ink), 2.5]]) {
@@ -41,7 +41,7 @@ export function paintCompass(ctx, { width, height, camera, ratio, grid, css }) {
       ctx.lineTo(x + dx * size, y + dy * size);
       ctx.stroke();
     }
-    // Towards the eye there is no room for its name beside the others.
+    // An axis towards the eye has no label.
     if (Math.hypot(dx, dy) > 0.3) outlined(name, x + dx * (size + 12), y + dy * (size + 9), css(ink));
   }
   const { length, pixels } = scaleBar(camera.focal() / camera.distance / ratio);
@@ -60,7 +60,7 @@ export function paintCompass(ctx, { width, height, camera, ratio, grid, css }) {
   return { length, pixels, axes: seen.map(({ name, dx, dy }) => [name, dx, dy]) };
 }
 
-// Paints them on the page's own canvas.
+// Draws them on the page's own canvas.
 export function showCompass(canvas, parts) {
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   const density = window.devicePixelRatio || 1;

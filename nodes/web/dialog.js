@@ -1,8 +1,8 @@
-// A question before something is done.
+// Confirmation dialog.
 
 import { by, element } from "./panel.js";
 
-// Asks with fields; gives their values, or null for no, which Escape and the first focus are.
+// Shows a dialog with fields; resolves to their values, or null if cancelled. Escape and the first focus cancel.
 export function askFirst({ title, text, action, fields = [] }) {
   const box = by("ask");
   const inputs = fields.map(({ label, ...properties }) => {
@@ -22,7 +22,7 @@ export function askFirst({ title, text, action, fields = [] }) {
       event.preventDefault();
       end(inputs.map(({ lastChild: of }) => (of.type === "number" ? of.valueAsNumber : of.value)));
     });
-    // Not of an earlier one.
+    // Ignores the result of an earlier dialog.
     box.onclose = () => box.open || resolve(null);
     box.showModal();
   });

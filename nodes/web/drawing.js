@@ -1,4 +1,4 @@
-// One frame after another, for whatever has changed.
+// Render loop: draws a frame after each change.
 
 import { add, length, sub } from "./math.js";
 import { showCompass } from "./compass.js";
@@ -7,11 +7,11 @@ import * as panel from "./panel.js";
 import { turned } from "./scene.js";
 
 const { by } = panel;
-// Scans stay this long, ms: those of a laser come in many small clouds.
+// Display time of scans, ms: a laser sends many small clouds.
 const SCAN_MS = 700;
-// The view moves until so long after it was moved, ms.
+// Time after the last movement until the view is at rest, ms.
 const MOVING_MS = 200;
-// A narrower window has the panel below, px.
+// Window width below which the panel is at the bottom, px.
 const NARROW = 640;
 const PANEL = 280;
 export const ROBOT_INK = [1, 0.78, 0.36, 1];
@@ -20,7 +20,7 @@ export class Drawing {
   constructor(parts) {
     Object.assign(this, parts);
     this.waiting = false;
-    // The frame that the graphics processor is at, and true if there is more to draw after it.
+    // Frame in progress on the GPU, and true if another one must follow.
     this.fence = null;
     this.due = false;
     this.movedAt = 0;
@@ -33,14 +33,14 @@ export class Drawing {
     requestAnimationFrame(() => this.frame());
   }
 
-  // Draws simply now, and fully when the view rests.
+  // Draws a fast frame now, and a full one once the view is at rest.
   moved() {
     this.movedAt = performance.now();
     this.redraw();
     setTimeout(() => this.redraw(), MOVING_MS + 50);
   }
 
-  // The window and the camera in it, as all that is drawn needs them.
+  // Viewport and camera as needed by all drawing.
   view() {
     const { canvas, camera } = this;
     const ratio = Math.min(window.devicePixelRatio || 1, 1.5);
@@ -68,7 +68,7 @@ export class Drawing {
     state.frames++;
   }
 
-  // Waits for the frame to be done, to know its time.
+  // Waits for the GPU to finish the frame and measures its time.
   poll() {
     const { gl } = this;
     setTimeout(() => {
@@ -97,7 +97,7 @@ export class Drawing {
     this.compass = showCompass(by("compass"), { camera: this.camera, ratio: seen.ratio, grid: this.gridStep, css: cssColour });
   }
 
-  // Has the camera look where its mode says.
+  // Moves the camera according to its mode.
   aim() {
     const { camera, cells, state } = this;
     if (camera.mode === "follow" && state.robot) camera.target = state.robot.position;
@@ -144,7 +144,7 @@ export class Drawing {
 
   drawRobot() {
     const { gl, camera, scene, state: { path, robot } } = this;
-    // In front of all: they must not be lost behind the map.
+    // On top, so that they are not hidden by the map.
     gl.disable(gl.DEPTH_TEST);
     if (path.length > 1) {
       scene.set("path", path.flatMap((p) => sub(p, path[0])));
@@ -155,7 +155,7 @@ export class Drawing {
     gl.enable(gl.DEPTH_TEST);
   }
 
-  // Words at places of the map.
+  // Text labels at map positions.
   showMarks(seen) {
     const marks = [];
     const mark = (point, text) => {
@@ -176,7 +176,7 @@ export class Drawing {
   }
 }
 
-// A colour of the style sheet, as it stands there and as numbers 0 to 1.
+// Colour of the style sheet, as text and as numbers 0 to 1.
 export const cssColour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 export const colourOf = (name) => {
   const hex = cssColour(name);

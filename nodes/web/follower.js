@@ -1,10 +1,10 @@
-// The map as its messages tell it: tiles of sorted cells, and what has changed since the last look.
+// Map follower: tiles of sorted cells, and the changes since the last pass.
 
 import { decodeKeys, keyText, placeIndex, tileIndex } from "./keys.js";
 
 export const NO_LABEL = 65535;
 
-// The cells of one tile, sorted by their place: parallel arrays with room to grow.
+// Cells of one tile, sorted by position: parallel growable arrays.
 class Tile {
   constructor(id) {
     this.id = id;
@@ -13,7 +13,7 @@ class Tile {
     this.counts = new Uint32Array(32);
     this.labels = new Uint16Array(32);
     this.seen = new Uint16Array(32);
-    // Cells of each label when it was last packed.
+    // Cells of each label when last packed.
     this.labelled = new Map();
   }
 
@@ -46,7 +46,7 @@ class Tile {
     return fresh;
   }
 
-  // True if the cell was there.
+  // True if the cell existed.
   remove(place) {
     const i = this.find(place);
     if (i >= this.size || this.places[i] !== place) return false;
@@ -83,7 +83,7 @@ export class Follower {
     this.begin = Date.now();
   }
 
-  // Seconds since this page began, as cells keep them.
+  // Seconds since the page was loaded, as stored in cells.
   now() { return Math.min(65535, Math.round((Date.now() - this.begin) / 1000)); }
 
   onMap(map) {
@@ -98,7 +98,7 @@ export class Follower {
       this.staging = null;
       this.renewed = true;
     }
-    // Its origin on earth may have become known.
+    // The geodetic origin may have become known.
     this.info = map.info;
     if (!this.staging || this.staging.sequence !== map.sequence || this.staging.chunks !== map.chunks) {
       this.staging = { sequence: map.sequence, chunks: map.chunks, come: new Set(), kept: new Map() };
@@ -106,7 +106,7 @@ export class Follower {
     const { come, kept } = this.staging;
     come.add(map.chunk);
     this.put(map);
-    // Places that the keyframe has, where something else may have been before.
+    // Cells of the keyframe at positions that may have been occupied before.
     if (this.sequence !== null) {
       decodeKeys(map.keys, (tile, place) => {
         if (!kept.has(tile)) kept.set(tile, new Set());
@@ -120,7 +120,7 @@ export class Follower {
     }
   }
 
-  // False: something is missing, and the map must be had anew.
+  // False: a message is missing, and a keyframe is needed.
   onUpdate(update) {
     if (this.sequence === null || !sameLattice(this.info, update.info)) return this.staging !== null;
     this.info = update.info;
@@ -164,8 +164,8 @@ export class Follower {
     }
   }
 
-  // Tiles that have changed, packed for drawing: four 16-bit numbers a cell (place, label, logarithm of
-  // its count, second of its last change), shuffled so that any beginning is a fair sample.
+  // Changed tiles, packed for drawing: four 16-bit numbers per cell (position, label, logarithm of
+  // its count, second of its last change), shuffled so that any prefix is a uniform sample.
   takeDirty(most) {
     const packed = [];
     for (const tile of this.dirty) {
@@ -178,7 +178,7 @@ export class Follower {
     return packed;
   }
 
-  // Counts the labels of a tile anew.
+  // Recounts the labels of a tile.
   countLabels(tile) {
     const change = (label, by) => {
       const cells = (this.labelled.get(label) ?? 0) + by;
@@ -195,7 +195,7 @@ export class Follower {
     tile.labelled = now;
   }
 
-  // Lowest and highest centre of a tile along the map's z, from the datum, m.
+  // Lowest and highest cell centre of a tile along the map's z, relative to the datum, m.
   heights(tile) {
     const [x, y, z] = this.rowOfHeight ?? [0, 0, 1];
     const [a, b, c] = tileIndex(tile.id);
@@ -216,7 +216,7 @@ export class Follower {
     return { key: keyText(id, place), count: tile.counts[i], label: tile.labels[i], age: this.now() - tile.seen[i] };
   }
 
-  // Of all cells, in the order of the keys.
+  // Point counts of all cells, in key order.
   counts() { return [...this.tiles.values()].flatMap((tile) => [...tile.counts.subarray(0, tile.size)]); }
 
   keys() {

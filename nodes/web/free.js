@@ -1,4 +1,4 @@
-// Free space: the cells that the mapper has seen through, as faint points.
+// Free space: cells traversed by rays, as faint points.
 
 import { CellRenderer } from "./renderer.js";
 
@@ -11,7 +11,7 @@ export class FreeSpace extends CellRenderer {
     this.size = 0;
   }
 
-  // Takes a message of the worker.
+  // Handles a message of the worker.
   take({ info, tiles, size }) {
     if (info) this.setLattice(info);
     for (const tile of tiles) this.setTile(tile);

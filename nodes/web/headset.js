@@ -1,4 +1,4 @@
-// The headset: what it sees, drawn where it is, its verdict, and the directions that the verdict leaves open.
+// Headset: its view at its pose, its verdict, and its weak directions.
 
 import { add, cross, dot, length, scale } from "./math.js";
 import { by, element, metres } from "./panel.js";
@@ -10,14 +10,14 @@ const ROTATION = 1;
 const MOST_WEAK = 6;
 const WEAK_INK = [0.95, 0.6, 0.95, 1];
 
-// What is drawn of a result; nothing before the first search.
+// Displayed parts of a result; none before the first search.
 export function headsetOf({ position, rotation, verdict, frame, weak }) {
   if (verdict === 0) return null;
   const sound = weak.filter(({ axis, sigma }) => length(axis) > 0 && [...axis, sigma].every(Number.isFinite));
   return { position, rotation, verdict, frame, weak: sound.slice(0, MOST_WEAK).map(drawnDirection) };
 }
 
-// Moves it to where transforms have it, which hold for the verdict OK alone.
+// Moves it to its pose from transforms, which are valid for the verdict OK only.
 export function follow(headset, place) {
   if (headset?.verdict === OK && place) Object.assign(headset, { position: place.position, rotation: place.rotation });
 }
@@ -33,7 +33,7 @@ export function showVerdict({ verdict: found, reason, weak }) {
 
 const spread = (kind, sigma) => `± ${kind === ROTATION ? `${((sigma * 180) / Math.PI).toFixed(1)}°` : metres(sigma)}`;
 
-// Lines of a direction, from the headset: along it as far as it is open, or an arc about it; and its words.
+// Lines of a weak direction from the headset: a segment of its sigma, or an arc about it; and its label.
 function drawnDirection({ axis, kind, sigma }) {
   const along = scale(axis, 1 / length(axis));
   const aside = across(along);
@@ -55,17 +55,17 @@ function drawnDirection({ axis, kind, sigma }) {
   return { lines, end: scale(along, reach), text: spread(kind, sigma) };
 }
 
-// A unit vector at right angles to another.
+// A unit vector perpendicular to another.
 function across(axis) {
   const other = Math.abs(dot(axis, [0, 0, 1])) < 0.9 ? [0, 0, 1] : [1, 0, 0];
   const v = cross(axis, other);
   return scale(v, 1 / length(v));
 }
 
-// Draws it with its eye, in the ink of its verdict, and what is open in front of all.
+// Draws the headset in the colour of its verdict, with its weak directions on top.
 export function drawHeadset(gl, scene, distance, { position: origin, rotation, verdict, weak }, colourOf) {
   const ink = [...colourOf(verdict === OK ? "--good" : "--bad"), 1];
-  // In front of all: it must not be lost within the map.
+  // On top, so that it is not hidden by the map.
   gl.disable(gl.DEPTH_TEST);
   const turn = turned(rotation, Math.max(1.2, distance * 0.05));
   scene.draw("view", gl.TRIANGLES, { origin, turn, ink: [...ink.slice(0, 3), 0.4] });

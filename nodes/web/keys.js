@@ -1,5 +1,5 @@
-// Keys of cells: Morton codes of 63 bits, which a number does not hold. A key is a tile of 32 x 32 x 32
-// indices (48 bits, exact in a number) and a place in it (15 bits).
+// Cell keys: Morton codes of 63 bits, too large for a number. A key is split into a tile of 32 x 32 x 32
+// indices (48 bits, exact in a number) and a position in it (15 bits).
 
 const LOW = 28;
 const TWO_28 = 2 ** LOW;
@@ -7,13 +7,13 @@ export const TILE = 32;
 const PLACES = TILE ** 3;
 const HALF = 2 ** 20;
 
-// Calls `each(tile, place, i)` for every key of the encoding morton21_delta_leb128, in its order.
+// Calls `each(tile, place, i)` for every key of the encoding morton21_delta_leb128, in order.
 export function decodeKeys(bytes, each) {
   let [low, high] = [0, 0];
   let at = 0;
   let i = 0;
   while (at < bytes.length) {
-    // The difference as 28 bits and the rest.
+    // Low 28 bits of the difference, and the rest.
     let [less, more, scale, shift] = [0, 0, 1, 0];
     for (;;) {
       if (at >= bytes.length || shift > 63) throw new RangeError("keys end within one");
@@ -37,7 +37,7 @@ export function decodeKeys(bytes, each) {
   return i;
 }
 
-// Lattice index of the first place of a tile.
+// Lattice index of the first position of a tile.
 export function tileIndex(tile) {
   const w = [0, 0, 0];
   let bit = 1;
@@ -57,8 +57,8 @@ for (let place = 0; place < PLACES; place++) {
   }
 }
 
-// Index of a place within its tile.
+// Lattice index of a position within its tile.
 export const placeIndex = (place) => [spread[3 * place], spread[3 * place + 1], spread[3 * place + 2]];
 
-// The key as text, as tests and other tools write it.
+// Key as text, as in tests and other tools.
 export const keyText = (tile, place) => (BigInt(tile) * BigInt(PLACES) + BigInt(place)).toString();

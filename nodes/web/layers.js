@@ -1,4 +1,4 @@
-// The boxes that show and hide what is drawn: only of what there is.
+// Layer checkboxes, for existing layers only.
 
 import { FREE_COLOUR } from "./colours.js";
 import { ROBOT_INK } from "./drawing.js";
@@ -14,7 +14,7 @@ export class Layers {
     Object.assign(this, { state, worker, free, redraw, key: "" });
   }
 
-  // Shows boxes of the robot and the headset once they are known, and of topics that somebody publishes.
+  // Shows checkboxes of the robot and the headset once known, and of published topics.
   show() {
     const { state } = this;
     const own = [["cells", "Cells", true], ["grid", "Ground grid", true], ["robot", "Robot and its path", state.robot, ROBOT_COLOUR], ["headset", "Headset", state.calibrated]];
@@ -22,7 +22,7 @@ export class Layers {
     const there = ({ kind, topic }) => DRAWN.includes(kind) && (!state.published || state.published.has(topic) || state.scansOn.has(topic));
     const channels = state.channels.filter(there).sort((a, b) => (a.kind === "free") - (b.kind === "free"));
     const key = JSON.stringify([layers.map(([name]) => name), channels.map(({ topic }) => topic), state.open]);
-    // Boxes that stay keep the focus of a keyboard.
+    // Existing checkboxes are kept, so that they keep the keyboard focus.
     if (this.key === key) return;
     this.key = key;
     const boxes = layers.map(([name, text, , colour]) => layerBox(text, state.shown[name], (on) => {
@@ -42,7 +42,7 @@ export class Layers {
     return box;
   }
 
-  // Asks for the messages of a topic, or no longer.
+  // Subscribes to a topic, or unsubscribes.
   want(topic, on) {
     const { clouds, scansOn } = this.state;
     scansOn[on ? "add" : "delete"](topic);

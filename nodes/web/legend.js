@@ -1,14 +1,14 @@
-// The legend of the colours: what it says in each mode, in the panel and in saved pictures.
+// Colour legend of each mode, in the panel and in saved images.
 
 import { gradient, labelColour } from "./colours.js";
 import { by, element, metres, seconds, whole } from "./panel.js";
 
 const UNLABELLED = "rgb(115 115 115)";
-// Most labels that are listed, and most in a picture.
+// Limits of listed labels, in the panel and in an image.
 const MOST_NAMES = 500;
 const MOST_PAINTED = 24;
 
-// Legend of a mode: a title, and either ticks of a bar (places 0 to 1) or colours with names and cells.
+// Legend of a mode: a title, and ticks of a bar (positions 0 to 1) or colours with names and cell counts.
 export function legendOf({ mode, range: [low, high], span, labels, names, size, thin }) {
   const at = (value) => (value - low) / (high - low);
   if (mode === "count") {
@@ -25,7 +25,7 @@ export function legendOf({ mode, range: [low, high], span, labels, names, size, 
     return { title: "height in the frame of the map", mode, ticks };
   }
   const title = "most frequent label of a cell";
-  if (thin) return { title, note: "Labels do not come with the thin form of the map." };
+  if (thin) return { title, note: "The thin form of the map has no labels." };
   if (labels.size === 0) return { title, note: "The cells of this map have no labels." };
   const sorted = [...labels].sort((a, b) => b[1] - a[1] || a[0] - b[0]);
   const rows = sorted.map(([label, cells]) => [labelColour(label), names.get(label) || `label ${label}`, cells]);
@@ -62,14 +62,14 @@ export function showLegend(legend) {
   by("legend").replaceChildren(...parts);
 }
 
-// A small square of a colour.
+// Colour swatch.
 export function swatch(colour) {
   const made = element("i", { className: "swatch" });
   made.style.background = colour;
   return made;
 }
 
-// Paints it into a picture, with its upper left corner at x, y; gives its height.
+// Draws it into an image, with its upper left corner at x, y; returns its height.
 export function paintLegend(ctx, { title, mode, ticks, rows, note }, { x, y, width, ink, quiet }) {
   const line = 18;
   const write = (text, left, top, colour, align = "left") => {

@@ -1,4 +1,4 @@
-// The page: its worker, its view and its panel put together.
+// Main module of the page: connects worker, view and panel.
 
 import { Camera } from "./camera.js";
 import { Drawing, colourOf, cssColour } from "./drawing.js";
@@ -26,7 +26,7 @@ const ROBOT = "base_link";
 const HEADSET = "headset_origin";
 const MODES = ["height", "count", "label", "age"];
 const QUIET_MS = 5000;
-// Time to connect, and to connect again, before the page says that it cannot, ms.
+// Timeout of a connection and of a reconnection before the page reports it, ms.
 const START_MS = 4000;
 const AGAIN_MS = 1000;
 const BEGUN = Date.now();
@@ -60,12 +60,12 @@ const slice = new Slice((bounds) => {
 });
 const planning = drawing.planning = new Planning({ services, camera, state, redraw });
 
-// --- What comes from the worker.
+// --- Messages of the worker.
 
 const handlers = {
   open({ session, file, thin }) {
     if (session !== state.session) {
-      // Another process: what was known of robots holds no more.
+      // A restarted server: the state of robots is unknown.
       transforms = new Transforms();
       slice.follow(null);
       Object.assign(state, { session, robot: null, headset: null, calibrated: false, path: [], names: new Map() });
@@ -187,7 +187,7 @@ function ranges() {
   if (!bounds) return;
   const [low, high] = [bounds.low[2], Math.max(bounds.high[2], bounds.low[2] + 1)];
   const [was, wasHigh] = state.heights;
-  // Steady while the map grows a little.
+  // Stable while the map grows a little.
   if (Math.abs(low - was) > 0.2 || Math.abs(high - wasHigh) > 0.2) state.heights = [low, high];
   slice.update(cells.heights(), state.heights);
   chooseColour();
@@ -204,7 +204,7 @@ function chooseColour() {
   redraw();
 }
 
-// --- Cells that are chosen, and distances between them.
+// --- Selected cells, and distances between them.
 
 function pick(x, y) {
   const seen = drawing.view();
@@ -248,9 +248,9 @@ function measure() {
   redraw();
 }
 
-// --- Buttons, keys, time.
+// --- Buttons, keys, timers.
 
-// The view has been moved: the address tells it.
+// Stores the moved view in the address.
 function moved() {
   drawing.moved();
   clearTimeout(moved.link);
@@ -302,22 +302,22 @@ function savePicture() {
   });
 }
 
-// Says what is known of the connection, also when nothing comes.
+// Shows the state of the connection, even without messages.
 function tick() {
-  // A map of a file says nothing more.
+  // A constant map sends nothing more.
   const quiet = state.live ? Date.now() - state.heardAt : 0;
   const changed = state.changedAt === null ? null : (Date.now() - state.changedAt) / 1000;
   const isEmpty = state.size === 0 && (!state.lattice || state.complete);
   cells.stale = state.open && quiet < QUIET_MS ? 0 : 1;
   if (!state.open) {
-    // The first connection, and one to a server that comes back at once, take a moment.
+    // A first connection, and one to a restarted server, take a moment.
     const waited = state.closedAt === null ? Date.now() - BEGUN > START_MS : Date.now() - state.closedAt > AGAIN_MS;
     const since = new Date(state.changedAt ?? state.heardAt).toLocaleTimeString();
     const text = state.lattice ? `No connection: this is the map of ${since}. Trying again …` : "No connection to the viewer server. Trying again …";
     panel.showBanner(waited ? text : null);
     panel.showState(waited ? "not connected" : "connecting", waited ? "bad" : "");
   } else if (quiet >= QUIET_MS) {
-    panel.showBanner(`Nothing was heard for ${panel.seconds(quiet / 1000)}.`, true);
+    panel.showBanner(`No message for ${panel.seconds(quiet / 1000)}.`, true);
     panel.showState("quiet", "warn");
   } else {
     panel.showBanner(null);
@@ -330,7 +330,7 @@ function tick() {
   by("heights").hidden = by("legend").hidden = state.size === 0;
   for (const id of ["rates", "nodes"]) by(id).closest("details").hidden = state.file;
   by("colour").querySelector("[value=age]").hidden = state.file;
-  // Cells grow older though nothing comes.
+  // Ages of cells grow without messages.
   if (changed !== null) cells.now = state.now + changed;
   if (cells.stale !== tick.stale || state.mode === "age") redraw();
   tick.stale = cells.stale;
@@ -364,10 +364,10 @@ setInterval(tick, 250);
 tick();
 redraw();
 
-// For tests: what is shown, in figures.
+// For tests: the displayed state as numbers.
 window.lattice = {
   state, camera, cells, drawing, free, picture, planning, player, slice, pick, frame: () => drawing.drawNow(),
-  // Keys, or counts in the order of the keys.
+  // Keys, or counts in key order.
   keys: (what = "keys") => new Promise((resolve) => {
     const take = ({ data }) => {
       if (data.type !== "keys") return;
@@ -377,7 +377,7 @@ window.lattice = {
     worker.addEventListener("message", take);
     worker.postMessage({ type: "keys" });
   }),
-  // Share of the pixels that are not ground.
+  // Fraction of pixels that are not background.
   lit() {
     drawing.drawNow();
     const [w, h] = [canvas.width, canvas.height];

@@ -1,4 +1,4 @@
-// Vectors, rotations and matrices. Matrices are column-major, as WebGL takes them.
+// Vectors, rotations and matrices. Matrices are column-major, as in WebGL.
 
 export const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 export const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -8,7 +8,7 @@ export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * 
 export const length = (a) => Math.hypot(a[0], a[1], a[2]);
 export const clamp = (x, low, high) => Math.min(high, Math.max(low, x));
 
-// A vector turned by a quaternion x, y, z, w.
+// A vector rotated by a quaternion x, y, z, w.
 export function rotate([x, y, z, w], v) {
   const t = scale(cross([x, y, z], v), 2);
   return add(add(v, scale(t, w)), cross([x, y, z], t));
@@ -23,7 +23,7 @@ export function multiplyQuaternions([ax, ay, az, aw], [bx, by, bz, bw]) {
   ];
 }
 
-// target_from_b of target_from_a and a_from_b.
+// target_from_b from target_from_a and a_from_b.
 export const compose = (a, b) => ({
   position: add(a.position, rotate(a.rotation, b.position)),
   rotation: multiplyQuaternions(a.rotation, b.rotation),

@@ -1,4 +1,4 @@
-// Messages that the page understands, from CDR.
+// Message types of the page, decoded from CDR.
 
 import { Reader } from "./cdr.js";
 
@@ -16,7 +16,7 @@ function latticeInfo(r) {
 }
 
 const ENCODING = "morton21_delta_leb128";
-// Behind the keys stand the counts, as LEB128 too.
+// The counts follow the keys, as LEB128 too.
 const THIN_ENCODING = `${ENCODING}_counts_leb128`;
 
 function columns(r, encoding) {
@@ -114,7 +114,7 @@ export function names(bytes) {
 const FLOAT32 = 7;
 const FLOAT64 = 8;
 
-// Points of a cloud as offsets from the first, in single precision.
+// Points of a cloud as offsets from the first one, in single precision.
 export function cloud(bytes) {
   const r = new Reader(bytes);
   const { stamp, frame } = header(r);

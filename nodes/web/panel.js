@@ -1,4 +1,4 @@
-// The panel's words and figures.
+// Texts and numbers of the panel.
 
 export const by = (id) => document.getElementById(id);
 
@@ -11,17 +11,17 @@ export function element(tag, properties = {}, ...children) {
 const numbers = new Intl.NumberFormat("en");
 export const whole = (n) => numbers.format(n);
 export const metres = (m) => `${m.toFixed(Math.abs(m) < 100 ? 2 : 1).replace("-", "−")} m`;
-// Edge of the cube of the same volume as a cell.
+// Edge of the cube of equal volume.
 export const cellSize = (volume) => `${Number(Math.cbrt(volume).toPrecision(3))} m`;
 export const seconds = (s) => (s < 60 ? `${Math.round(s)} s` : `${Math.round(s / 60)} min`);
 
 const NOTE_MS = 2000;
 const LEVELS = ["ok", "warn", "bad", "warn"];
 
-// The lattice and the size of its cells.
+// Lattice and cell size.
 export const latticeText = ({ lattice, volume }) => `${lattice.toUpperCase()}, cells of ${cellSize(volume)}`;
 
-// The frame and its axes (REP 103), with the place on earth where it is known.
+// Frame and its axes (REP 103), with the geodetic origin if known.
 export function frameText(frame, { hasOrigin, origin: [latitude, longitude] }) {
   const degrees = (x, [plus, minus]) => `${Math.abs(x).toFixed(5)}° ${x < 0 ? minus : plus}`;
   return hasOrigin ? `${frame}, from ${degrees(latitude, "NS")}, ${degrees(longitude, "EW")}` : `${frame}: x east, y north`;
@@ -49,7 +49,7 @@ export function showBanner(text, warn = false) {
   if (banner.textContent !== text) banner.textContent = text ?? "";
 }
 
-// A line for a layer, with a box that turns it on and off.
+// Layer line with a checkbox.
 export function layerBox(name, on, changed, colour) {
   const box = element("input", { type: "checkbox", checked: on });
   box.addEventListener("change", () => changed(box.checked));
@@ -58,7 +58,7 @@ export function layerBox(name, on, changed, colour) {
   return element("label", { className: "layer" }, box, ...(colour ? [mark] : []), name);
 }
 
-// Says something at a place of the view for a while.
+// Shows a note at a position of the view for a while.
 export function showNote(text, x, y) {
   const note = by("note");
   Object.assign(note, { hidden: !text, textContent: text ?? "" });
@@ -108,7 +108,7 @@ const known = new Map();
 const MOST_TASKS = 200;
 const OLD_MS = 5000;
 
-// Tasks of nodes that were stated just now.
+// Recently stated diagnostic tasks.
 export const tasks = () => [...known.values()].filter(({ at }) => Date.now() - at < OLD_MS);
 
 export function showDiagnostics({ status }) {

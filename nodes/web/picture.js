@@ -1,4 +1,4 @@
-// A saved picture: the view with its legend, axes and scale bar.
+// Saved image: the view with legend, axes and scale bar.
 
 import { paintCompass } from "./compass.js";
 import { paintLegend } from "./legend.js";
@@ -7,7 +7,7 @@ import { whole } from "./panel.js";
 const WIDTH = 220;
 const PAD = 12;
 
-// The picture as a canvas; the view has just been drawn.
+// The image as a canvas; the view has just been drawn.
 export function pictureOf({ canvas, ratio, camera, grid, legend, css, facts: { size, lattice, frame } }) {
   const out = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
   const ctx = out.getContext("2d");
@@ -18,7 +18,7 @@ export function pictureOf({ canvas, ratio, camera, grid, legend, css, facts: { s
   const lines = [`${whole(size)} cells · ${lattice}`, frame];
   const [ink, quiet] = [css("--ink"), css("--quiet")];
   const text = { x: 2 * PAD, y: 2 * PAD + 18 * lines.length + 4, width: WIDTH, ink, quiet };
-  // Its height, before the card behind it.
+  // Height of the legend, before the card behind it is drawn.
   const trial = document.createElement("canvas").getContext("2d");
   trial.font = ctx.font;
   const below = paintLegend(trial, legend, text);

@@ -1,4 +1,4 @@
-// A path between two picked cells for a ball, as the mapper finds it.
+// Path of a ball between two selected cells, planned by the mapper.
 
 import { add, length, sub } from "./math.js";
 import { by, metres } from "./panel.js";
@@ -29,7 +29,7 @@ export class Planning {
     this.redraw();
   }
 
-  // A cell was clicked; the ball begins before the face that is seen.
+  // Handles a clicked cell; the ball starts in front of the visible face.
   picked(centre) {
     if (!this.on) return;
     const to = sub(this.camera.eye(), centre);
@@ -63,7 +63,7 @@ export class Planning {
   draw(gl, scene) {
     const [first] = this.path;
     if (!first) return;
-    // In front of all, as the robot's.
+    // On top, like the robot's path.
     gl.disable(gl.DEPTH_TEST);
     const corners = this.path.flatMap((point) => sub(point, first));
     scene.set("way", corners);

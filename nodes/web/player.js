@@ -1,15 +1,15 @@
-// A log that plays: its time and place, and controls where the server offers them.
+// Bag playback: its position and time, and controls if offered by the server.
 
 import { by } from "./panel.js";
 import { rated, requests, said } from "./requests.js";
 
 const LOOK_MS = 3000;
 const SHOW_MS = 500;
-// A player that has stated nothing for so long has ended, ms.
+// Time without status after which a player counts as ended, ms.
 const OLD_MS = 8000;
 const JUMP_S = 10;
 const ROUNDED_S = 1e-5;
-// Times before are of a simulation and no date, s.
+// Earlier times are simulated and shown without a date, s.
 const NO_DATE_S = 1e8;
 
 const two = (n) => String(n).padStart(2, "0");
@@ -21,7 +21,7 @@ const date = (s) => (s < NO_DATE_S ? `${s.toFixed(1)} s` : new Date(s * 1000).to
 
 export class Player {
   constructor(services, writing) {
-    // `log`: what the player states of itself; `answers`: a player of whatever kind answers calls; `now`: of what is shown, s.
+    // `log`: status of the player; `answers`: true if a player replies to calls; `now`: time of the displayed data, s.
     Object.assign(this, { services, writing, log: null, answers: false, paused: false, now: null, looking: false, dragged: false });
     const does = (id, work) => by(id).addEventListener("click", () => writing.tried(work()));
     does("pause", () => this.act(this.paused ? "resume" : "pause", requests.nothing()));
@@ -41,12 +41,12 @@ export class Player {
     setInterval(() => this.show(), SHOW_MS);
   }
 
-  // The time of what is shown, in s.
+  // Time of the displayed data, s.
   heard(stamp) {
     if (stamp > 0) this.now = stamp;
   }
 
-  // Takes what nodes state of themselves: a player says where it is in its log.
+  // Handles diagnostics: a player states its position in the log.
   told({ status }) {
     for (const { name, level, values } of status) {
       if (!name.endsWith(": log")) continue;
@@ -59,7 +59,7 @@ export class Player {
     }
   }
 
-  // Time of the log that plays now, s; that of the newest transform where the player states none.
+  // Current log time, s; the stamp of the newest transform if the player states none.
   time() {
     const { log } = this;
     if (!log) return this.now;
@@ -67,7 +67,7 @@ export class Player {
     return Math.min(log.end, Math.max(log.begin, log.now + since));
   }
 
-  // Time at the place of the bar, s.
+  // Log time at the position of the slider, s.
   slid() {
     const { begin, end } = this.log;
     return begin + (Number(by("seek").value) / 1000) * (end - begin);
@@ -85,7 +85,7 @@ export class Player {
   }
 
   async seek(to) {
-    // Within the log, by more than a number of this size is rounded.
+    // Kept within the log by more than the rounding error of a number of this size.
     const { begin, end } = this.log ?? { begin: -Infinity, end: Infinity };
     const time = Math.max(begin + ROUNDED_S, Math.min(end - ROUNDED_S, to));
     if (!said(await this.services.call("seek", requests.seek(time)))) throw new Error("the log does not reach there");
@@ -109,7 +109,7 @@ export class Player {
     by("step").disabled = !this.paused;
   }
 
-  // Asks the player for what it says of itself; nothing answers while there is none.
+  // Requests the state of the player; there is no reply without a player.
   async look() {
     if (this.looking || document.hidden || !this.services.find("is_paused")) return;
     this.looking = true;

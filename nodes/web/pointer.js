@@ -1,11 +1,11 @@
-// Mouse, fingers and keys: what they do to the camera, and clicks.
+// Mouse, touch and keyboard control of the camera, and clicks.
 
 const STILL = 4;
 
 export function watchPointer(canvas, camera, { moved, clicked }) {
   const down = new Map();
   let travelled = 0;
-  // Pixels between two fingers.
+  // Distance of two fingers, pixels.
   let pinch = null;
   const apart = () => {
     const [a, b] = [...down.values()];
@@ -50,7 +50,7 @@ export function watchPointer(canvas, camera, { moved, clicked }) {
   }, { passive: false });
 }
 
-// Calls what belongs to a key, unless a person types into a field.
+// Keyboard shortcuts, except while typing into a field.
 export function watchKeys(actions) {
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || /^(SELECT|INPUT)$/.test(event.target.tagName)) return;

@@ -1,4 +1,4 @@
-// Draws the cells: a buffer for each tile, ray-cast where cells are large, points where they are small.
+// Cell renderer: a buffer per tile; large cells are ray-cast, small ones are points.
 
 import * as shaders from "./shaders.js";
 import { cellShape, basisInMap } from "./cell.js";
@@ -7,9 +7,9 @@ import { add, dot, length, scale, sub } from "./math.js";
 import { paletteBytes } from "./colours.js";
 
 const BYTES_A_CELL = 8;
-// Cells of less than so many pixels are points.
+// Cell size in pixels below which cells are points.
 const SMALL = 1.6;
-// Time that ray-casting may take in a frame, at rest and while the view moves, ms; else cells are points.
+// Ray-casting time budget per frame, at rest and while the view moves, ms; above it cells are points.
 const PATIENCE = { still: 1500, moving: 60 };
 
 export function program(gl, vertex, fragment) {
@@ -48,13 +48,13 @@ export class CellRenderer {
     this.now = 0;
     this.stale = 0;
     this.drawn = 0;
-    // Time for a million pixels of cells, ms, as frames have taken, and pixels of the last frame.
+    // Measured time per million cell pixels, ms, and pixels of the last frame.
     this.pace = 1;
     this.pixels = 0;
     this.target = null;
   }
 
-  // Another lattice: its tiles go.
+  // Starts another lattice: its tiles are dropped.
   setLattice(info) {
     this.clear();
     const basis = basisInMap(info);
@@ -72,7 +72,7 @@ export class CellRenderer {
     this.gl.deleteVertexArray(array);
   }
 
-  // Takes a tile as the worker packs it.
+  // Stores a tile packed by the worker.
   setTile({ id, index, size, cells, heights }) {
     const { gl } = this;
     let tile = this.tiles.get(id);
@@ -114,7 +114,7 @@ export class CellRenderer {
     return add(this.tiles.get(tile).first, this.fromDatum([a, b, c]));
   }
 
-  // Radius of a ball around a tile, m.
+  // Bounding radius of a tile, m.
   reach() {
     const corners = [[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]];
     return Math.max(...corners.map((c) => length(this.fromDatum(scale(c, TILE / 2))))) + this.lattice.radius;
@@ -166,7 +166,7 @@ export class CellRenderer {
     gl.bindVertexArray(tile.array);
   }
 
-  // Tiles in sight, the nearest first, with the pixels of a cell in them.
+  // Visible tiles, the nearest first, with their cell size in pixels.
   visible(view) {
     const reach = this.reach();
     const { right, up, back } = view.axes;
@@ -199,7 +199,7 @@ export class CellRenderer {
     const simple = this.pixels * this.pace > (moving ? PATIENCE.moving : PATIENCE.still);
     if (simple) {
       this.pixels = 0;
-      // It is tried again some time.
+      // Retried later.
       this.pace *= 0.98;
     }
     if (near.length > 0 && !simple) {
@@ -214,7 +214,7 @@ export class CellRenderer {
     if (far.length > 0) {
       this.use(this.flat, view);
       for (const { tile, pixels } of far) {
-        // Where cells are much smaller than a pixel a share of them says as much.
+        // Cells much smaller than a pixel are subsampled.
         const share = Math.min(1, Math.max(0.02, pixels * pixels));
         const cells = Math.ceil(tile.size * share);
         gl.uniform1f(this.flat.at.u_enlarge, 1 / Math.sqrt(Math.max(share, 0.25)));
@@ -226,12 +226,12 @@ export class CellRenderer {
     gl.bindVertexArray(null);
   }
 
-  // Notes how long the frame has taken.
+  // Records the time of a frame.
   timed(ms) {
     if (this.pixels > 0.5) this.pace += 0.5 * (ms / this.pixels - this.pace);
   }
 
-  // The cell at a place of the screen, in pixels from its lower left corner.
+  // Cell at a screen position, in pixels from the lower left corner.
   pick(view, x, y) {
     if (!this.lattice) return null;
     const { gl } = this;
@@ -257,14 +257,14 @@ export class CellRenderer {
     return { tile: tile.id, place: out[1] };
   }
 
-  // Lowest and highest centre of a cell, m; null without cells.
+  // Lowest and highest cell centre, m; null without cells.
   heights() {
     let [low, high] = [Infinity, -Infinity];
     for (const { heights } of this.tiles.values()) [low, high] = [Math.min(low, heights[0]), Math.max(high, heights[1])];
     return low <= high ? [low, high] : null;
   }
 
-  // Lowest and highest corner of what is mapped, without the outermost few cells.
+  // Lowest and highest corner of the map, without the outermost few cells.
   bounds() {
     const tiles = [...this.tiles.values()];
     if (tiles.length === 0) return null;

@@ -1,8 +1,8 @@
-// Requests of services in CDR, and what their answers say.
+// CDR service requests, and decoding of responses.
 
 import { Reader } from "./cdr.js";
 
-// Little-endian CDR of numbers, each with the letter of its kind.
+// Little-endian CDR of numbers, each with its type letter.
 function cdr(...parts) {
   const bytes = [0, 1, 0, 0];
   for (const [kind, value] of parts) {
@@ -32,7 +32,7 @@ export const requests = {
   seek: (time) => cdr(["i", Math.floor(time)], ["u", Math.floor((time % 1) * 1e9)]),
 };
 
-// Success, words, and the number that follows where there is one.
+// Success, message, and the number after them, if any.
 export function outcome(bytes) {
   const r = new Reader(bytes);
   const answer = { success: r.bool(), message: r.string() };

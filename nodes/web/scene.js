@@ -1,17 +1,17 @@
-// What is drawn besides the cells: ground grid, clouds, robot with its path, headset, measured line.
+// Scene besides the cells: ground grid, clouds, robot with its path, headset, measured line.
 
 import * as shaders from "./shaders.js";
 import { program } from "./renderer.js";
 import { rotate, sub } from "./math.js";
 
 const IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1];
-// A vehicle of one metre, x forward: a wedge that shows where it goes.
+// Vehicle of one metre, x forward: a wedge in the direction of travel.
 const ROBOT = [
   [0.6, 0, 0.1], [-0.5, 0.38, 0], [-0.3, 0, 0.1], [0.6, 0, 0.1], [-0.3, 0, 0.1], [-0.5, -0.38, 0],
   [0.6, 0, 0.1], [-0.5, 0.38, 0], [-0.35, 0, 0.42], [0.6, 0, 0.1], [-0.35, 0, 0.42], [-0.5, -0.38, 0],
   [-0.5, 0.38, 0], [-0.3, 0, 0.1], [-0.35, 0, 0.42], [-0.5, -0.38, 0], [-0.3, 0, 0.1], [-0.35, 0, 0.42],
 ].flat();
-// What a headset sees: lines from its eye, and the faces between them.
+// Headset frustum: edges from its eye, and the faces between them.
 const CORNERS = [[1, 0.6, 0.4], [1, -0.6, 0.4], [1, -0.6, -0.4], [1, 0.6, -0.4]];
 const FRUSTUM = CORNERS.flatMap((corner, i) => [[0, 0, 0], corner, corner, CORNERS[(i + 1) % 4]]).flat();
 const VIEW = CORNERS.flatMap((corner, i) => [[0, 0, 0], corner, CORNERS[(i + 1) % 4]]).flat();
@@ -26,7 +26,7 @@ export class Scene {
     this.set("view", VIEW);
   }
 
-  // Keeps the corners of a shape.
+  // Stores the vertices of a shape.
   set(name, corners) {
     const { gl } = this;
     let shape = this.shapes.get(name);
@@ -52,7 +52,7 @@ export class Scene {
     gl.uniform1f(this.plain.at.u_reach, 0);
   }
 
-  // Draws a shape with its origin at a place of the map, turned and scaled.
+  // Draws a shape at a map position, rotated and scaled.
   draw(name, mode, { origin, turn = IDENTITY, ink, size = 1, fade = null }) {
     const { gl, plain: { at } } = this;
     const shape = this.shapes.get(name);
@@ -68,7 +68,7 @@ export class Scene {
     gl.bindVertexArray(null);
   }
 
-  // Lines of the ground around a place, at spacings that suit the distance.
+  // Ground grid around a position, with a spacing by distance.
   grid(target, height, distance, ink) {
     const { gl } = this;
     const step = 10 ** Math.round(Math.log10(distance / 6));
@@ -89,7 +89,7 @@ export class Scene {
   }
 }
 
-// Matrix of a rotation, scaled.
+// Matrix of a scaled rotation.
 export function turned(rotation, size = 1) {
   const axes = [[size, 0, 0], [0, size, 0], [0, 0, size]];
   return axes.flatMap((axis) => rotate(rotation, axis));

@@ -1,4 +1,4 @@
-// The services that the server offers, as promises.
+// Services offered by the server, as promises.
 
 const PATIENCE_MS = 8000;
 
@@ -10,7 +10,7 @@ export class Services {
     this.next = 1;
   }
 
-  // Takes a message of the worker; true if it was an answer.
+  // Handles a message of the worker; true if it is a response.
   answered({ call, bytes, error }) {
     const waits = this.waiting.get(call);
     if (!waits) return;
@@ -20,7 +20,7 @@ export class Services {
     else waits.reject(new Error(error));
   }
 
-  // The service whose name ends so, if it is offered.
+  // Offered service with a name suffix.
   find(end) {
     return this.offered.find(({ name }) => name.endsWith(`/${end}`));
   }
@@ -30,7 +30,7 @@ export class Services {
     if (!service) return Promise.reject(new Error(`${end} is not offered`));
     const call = this.next++;
     return new Promise((resolve, reject) => {
-      const late = setTimeout(() => this.answered({ call, error: "no answer came" }), PATIENCE_MS);
+      const late = setTimeout(() => this.answered({ call, error: "no reply" }), PATIENCE_MS);
       this.waiting.set(call, { resolve, reject, late });
       this.worker.postMessage({ type: "call", service: service.id, call, request });
     });

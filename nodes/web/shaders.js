@@ -1,6 +1,6 @@
-// Programs of the graphics processor.
+// Shader programs.
 
-// Colours of cells, the same for both ways of drawing them.
+// Cell colours, common to both renderings.
 const COLOUR = `
 uniform sampler2D u_palette;
 uniform int u_colour;        // 0 height, 1 count, 2 label, 3 age
@@ -47,7 +47,7 @@ vec3 offset(uint place) {
   return u_basis * vec3(compact(place), compact(place >> 1), compact(place >> 2));
 }
 
-// Puts a cell on the screen; false if it is out of sight.
+// Transforms a cell to the screen; false if it is not visible.
 bool put(vec3 centre, float height, float size) {
   gl_Position = u_clip * vec4(centre, 1.0);
   gl_PointSize = min(size, u_most);
@@ -56,7 +56,7 @@ bool put(vec3 centre, float height, float size) {
   return shown;
 }`;
 
-// Cells as points behind which a ray is followed into the true shape.
+// Cells as point sprites, in which rays are cast against the cell shape.
 export const CELL_VERTEX = `#version 300 es
 precision highp float;
 precision highp int;
@@ -77,7 +77,7 @@ void main() {
   v_size = size;
   v_colour = colour(a_cell, height);
   if (!put(v_centre, height, size)) return;
-  // A point is left out when its middle is beyond the edge: it is moved to the edge and made larger.
+  // A point sprite is clipped by its centre: it is moved to the screen edge and enlarged.
   vec2 at = gl_Position.xy / gl_Position.w;
   vec2 over = max(abs(at) - 1.0, 0.0);
   vec2 pixels = over * 0.5 * u_screen;
@@ -96,8 +96,8 @@ uniform mat4 u_clip;
 uniform float u_near;
 uniform vec4 u_window;       // place and size of the picture, pixels
 
-// Follows the ray of this pixel into the cell: distance to it, the face that is met, and how far from there the
-// plane is that was passed before it, m: 0 at an edge between two faces in sight.
+// Casts the ray of this pixel against the cell: distance, face that is hit, and distance in m to the
+// previous plane: 0 at an edge between two visible faces.
 bool meet(vec3 centre, out float t, out vec3 normal, out float edge) {
   vec2 at = (gl_FragCoord.xy - u_window.xy) / u_window.zw * 2.0 - 1.0;
   vec3 ray = u_rays * vec3(at, 1.0);
@@ -148,13 +148,13 @@ void main() {
   float t, edge;
   if (!meet(v_centre, t, normal, edge)) discard;
   float light = 0.52 + 0.30 * normal.z + 0.22 * dot(normal, normalize(vec3(0.55, -0.75, 0.2)));
-  // Edges are dark, a pixel or two wide, where cells are large enough for that.
+  // Edges are dark, a pixel or two wide, where cells are large enough.
   float line = 1.0 - smoothstep(0.6, 2.2, edge / (t * u_pixel));
   light *= 1.0 - 0.5 * line * smoothstep(8.0, 24.0, v_size);
   o_colour = vec4(v_colour * light, 1.0);
 }`;
 
-// The same into numbers: which cell is at a pixel.
+// Picking: the same with cell indices as output.
 export const PICK_FRAGMENT = `#version 300 es
 precision highp float;
 precision highp int;
@@ -171,7 +171,7 @@ void main() {
   o_cell = uvec4(uint(u_tile_number) + 1u, v_place, floatBitsToUint(t), 0u);
 }`;
 
-// Cells as plain points, for those that are small on the screen and for slow machines.
+// Cells as plain points, for small cells and slow machines.
 export const FLAT_VERTEX = `#version 300 es
 precision highp float;
 precision highp int;
@@ -195,7 +195,7 @@ flat in vec3 v_colour;
 out vec4 o_colour;
 void main() { o_colour = vec4(v_colour, 1.0); }`;
 
-// Lines, points of clouds and triangles of one colour.
+// Lines, cloud points and triangles of one colour.
 export const PLAIN_VERTEX = `#version 300 es
 precision highp float;
 layout(location = 0) in vec3 a_place;

@@ -1,18 +1,18 @@
-// Heights between which cells are shown, and the roof that is taken off.
+// Height range of displayed cells, and removal of the roof.
 
 import { clamp } from "./math.js";
 import { by, metres } from "./panel.js";
 
 const STEPS = 1000;
-// The cut without a roof: so far above the robot's frame, m; where there is none, at this share of the heights.
+// Height of the roof cut: above the robot's frame, m; without a robot, as a fraction of the height range.
 const OVER_ROBOT_M = 1.6;
 const SHARE = 0.6;
-// The cut follows the robot in steps, m.
+// Step of the cut when it follows the robot, m.
 const STEP_M = 0.2;
 
 export class Slice {
   constructor(changed) {
-    // Lowest and highest centre of what is there, most of it, and the bounds, m; null: none.
+    // Range of most cell centres, and bounds, m; null: none.
     Object.assign(this, { changed, span: [0, 1], most: [0, 1], bounds: [null, null], robot: null });
     ["low", "high"].forEach((id, end) => by(id).addEventListener("input", () => this.slid(id, end)));
     by("roof").addEventListener("change", () => {
@@ -21,14 +21,14 @@ export class Slice {
     });
   }
 
-  // Takes the heights of what there is now, and those of most cells.
+  // Sets the current height range, and that of most cells.
   update(span, most) {
     if ([0, 1].every((end) => span[end] === this.span[end] && most[end] === this.most[end])) return;
     Object.assign(this, { span, most });
     this.cut();
   }
 
-  // Takes the height of the robot; null: there is none.
+  // Sets the height of the robot; null: no robot.
   follow(robot) {
     if (robot === this.robot || (robot !== null && this.robot !== null && Math.abs(robot - this.robot) < STEP_M)) return;
     this.robot = robot;
@@ -49,7 +49,7 @@ export class Slice {
     return this.robot === null ? low + SHARE * (high - low) : this.robot + OVER_ROBOT_M;
   }
 
-  // Hides what is above the cut, while that is wanted.
+  // Hides cells above the cut, if enabled.
   cut() {
     if (by("roof").checked) this.bounds[1] = this.roof();
     this.show();

@@ -1,4 +1,4 @@
-// The tree of frames, and where one is in another.
+// Frame tree, with lookup of transforms.
 
 import { compose, identity } from "./math.js";
 
@@ -17,7 +17,7 @@ export class Transforms {
     }
   }
 
-  // target_from_frame, or null where the tree does not lead from one to the other.
+  // target_from_frame, or null without a connection.
   find(target, frame) {
     let [at, pose, stamp] = [frame, identity, 0];
     for (let depth = 0; depth < DEEPEST; depth++) {

@@ -1,4 +1,4 @@
-// Connection, decoding and following, beside the page's thread.
+// Worker: connection, decoding and map following.
 
 import * as calls from "./calls.js";
 import * as messages from "./messages.js";
@@ -7,7 +7,7 @@ import { Follower } from "./follower.js";
 const PROTOCOLS = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 const MESSAGE_DATA = 1;
 const HEADER = 13;
-// A slow link has the keys and counts of the map alone.
+// On a slow link only keys and counts of the map are subscribed to.
 const THIN = self.location.search === "?thin=1" ? "_thin" : "";
 const MOST_TILES = 200;
 
@@ -15,7 +15,7 @@ let socket = null;
 let session = null;
 let retry = 250;
 let follower = new Follower();
-// Free space, while it is wanted.
+// Free space, while it is shown.
 let free = new Follower();
 let channels = new Map();
 let subscriptions = new Map();
@@ -26,7 +26,7 @@ let changed = false;
 const rates = new Map();
 const wanted = new Set(["tf", "static", "map", "updates", "diagnostics", "calibration", "names"]);
 
-// How each channel is read, by the type and the end of its topic.
+// Decoder of each channel, by type and topic suffix.
 const KINDS = [
   ["map", "lattice_msgs/msg/LatticeMap", new RegExp(`(^|/)map${THIN}$`)],
   ["free", "lattice_msgs/msg/LatticeMap", /(^|\/)free$/],
@@ -72,7 +72,7 @@ function onText(message) {
     retry = 250;
     if (session !== message.sessionId) {
       session = message.sessionId;
-      // Another process: nothing that was known holds once its map comes.
+      // A restarted server: the previous state is invalid once its map arrives.
       follower.info = null;
     }
     published = new Map();
@@ -107,7 +107,7 @@ function unsubscribe(unwanted) {
   }
 }
 
-// Asks for the whole map again.
+// Requests the whole map again.
 function renewMap() {
   const isMap = (channel) => channel.kind === "map";
   unsubscribe(isMap);
@@ -162,7 +162,7 @@ function onMap(map) {
   changed = true;
 }
 
-// Row of the matrix from lattice indices to the map that gives z.
+// Row of the matrix from lattice indices to the map's z.
 function heightRow({ generator: g, place: { rotation: [x, y, z, w] } }) {
   const row = [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)];
   return [0, 1, 2].map((k) => row[0] * g[k] + row[1] * g[3 + k] + row[2] * g[6 + k]);

@@ -1,4 +1,4 @@
-// Changes by a person: the map, the parameters of nodes; each thing only where the server offers it.
+// Changes by the user: map and node parameters, as far as offered by the server.
 
 import { askFirst } from "./dialog.js";
 import { by, element, whole } from "./panel.js";
@@ -27,7 +27,7 @@ export class Writing {
     by("said").className = bad ? "bad" : "";
   }
 
-  // Says what came of something that was tried; nothing to say clears no word on what was tried later.
+  // Shows the result of an action; an empty result does not clear a later one.
   async tried(work) {
     const attempt = ++this.attempts;
     try {
@@ -52,7 +52,7 @@ export class Writing {
     const fields = ends.flatMap((point, end) => AXES.map((axis, k) => ({
       label: `${end ? "to" : "from"} ${axis}, m`, type: "number", value: point[k].toFixed(2), id: `box-${end ? "to" : "from"}-${axis}`,
     })));
-    const text = "Cells whose centres lie in this box go from the map of every user. Two measured cells, or the chosen one, begin the box.";
+    const text = "Removes the cells with centres in this box, for every user. The initial box spans two measured cells, or surrounds the selected cell.";
     const values = await askFirst({ title: "Clear a box", text, action: "Clear", fields });
     if (!values) return null;
     const { number } = await this.change("clear_box", requests.clearBox(values.slice(0, 3), values.slice(3)));
@@ -60,7 +60,7 @@ export class Writing {
   }
 
   async reset() {
-    const text = `All ${whole(this.state.size)} cells go, for every user. What is not saved is lost.`;
+    const text = `Removes all ${whole(this.state.size)} cells, for every user. Unsaved changes are lost.`;
     if (!await askFirst({ title: "Empty the map", text, action: "Empty it" })) return null;
     return (await this.change("reset", requests.nothing())).message || "the map is emptied";
   }
@@ -73,7 +73,7 @@ export class Writing {
     return `${message}: ${whole(number)} cells`;
   }
 
-  // The mapper's own words on a point; null if it cannot be asked.
+  // Query of a point by the mapper; null if it is not available.
   async query(point) {
     if (!this.services.find("query")) return null;
     const answer = queried(await this.services.call("query", requests.query(point)));

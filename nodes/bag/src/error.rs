@@ -1,14 +1,14 @@
-//! Errors of bags, each with the file, the place, the reason and the remedy.
+//! Errors of bags, each with file, position, reason and remedy.
 
 use std::{io, path::Path, path::PathBuf, sync::Arc};
 
 use thiserror::Error;
 
-/// An error of reading, writing or playing a bag.
+/// Error of reading, writing or playing a bag.
 #[derive(Clone, Debug, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum BagError {
-    /// The operating system refused.
+    /// Error of the operating system.
     #[error("{}: cannot {doing}: {source}; check that the path exists, its permissions and the free space", path.display())]
     Io {
         path: PathBuf,
@@ -16,14 +16,14 @@ pub enum BagError {
         #[source]
         source: Arc<io::Error>,
     },
-    /// The file is none that a rosbag2 bag holds.
+    /// Not a storage file of rosbag2.
     #[error("{}: not a ROS 2 bag file: it is {found}; {remedy}", path.display())]
     Foreign {
         path: PathBuf,
         found: String,
         remedy: &'static str,
     },
-    /// The file ends early, as after a crash of the recorder.
+    /// Truncated file, as after a crash of the recorder.
     #[error(
         "{}: truncated: the file ends at byte {size_bytes} inside {inside}; \
          {readable_messages} messages before it can be read; \
@@ -33,30 +33,30 @@ pub enum BagError {
     Truncated {
         path: PathBuf,
         size_bytes: u64,
-        /// The cut part, with its own offset.
+        /// The truncated part, with its own offset.
         inside: String,
         readable_messages: u64,
     },
-    /// The bytes contradict the format.
+    /// Data that contradict the format.
     #[error("{}: damaged at {position}: {reason}; {remedy}", path.display())]
     Corrupt {
         path: PathBuf,
         position: String,
-        /// The contradiction, with the numbers.
+        /// The contradiction, with values.
         reason: String,
         remedy: &'static str,
     },
-    /// `metadata.yaml` cannot be used.
+    /// Invalid `metadata.yaml`.
     #[error("{}: {reason}; move the file away to have it rebuilt from the storage files", path.display())]
     Metadata {
         path: PathBuf,
-        /// The reason, with line and column where known.
+        /// The reason, with line and column if known.
         reason: String,
     },
-    /// `metadata.yaml` or a link points outside the bag.
-    #[error("{}: {entry:?} leads out of the bag folder; such a bag is refused: correct the entry, or put the file in place of the link", path.display())]
+    /// `metadata.yaml` or a link refers to a path outside the bag.
+    #[error("{}: {entry:?} is outside the bag folder: correct the entry, or replace the link by the file", path.display())]
     PathTraversal { path: PathBuf, entry: String },
-    /// Something is larger than the limits allow.
+    /// Size above a limit.
     #[error("{}: {what} at {position} takes {size_bytes} bytes, more than the limit of {limit_bytes}; {remedy}", path.display())]
     TooLarge {
         path: PathBuf,
@@ -66,33 +66,33 @@ pub enum BagError {
         limit_bytes: u64,
         remedy: &'static str,
     },
-    /// The bag uses something that is not implemented.
+    /// Unsupported feature.
     #[error("{}: {what} is not supported; {remedy}", path.display())]
     Unsupported {
         path: PathBuf,
         what: String,
         remedy: &'static str,
     },
-    /// The target of a writer is taken.
+    /// The target of a writer exists.
     #[error("{}: exists already{why}; choose another path{or_overwrite}", path.display())]
     Exists {
         path: PathBuf,
-        /// The reason to keep it, after a separator, or nothing.
+        /// Reason for keeping it, after a separator, or empty.
         why: String,
-        /// The other remedy, or nothing.
+        /// Second remedy, or empty.
         or_overwrite: &'static str,
     },
-    /// An argument of the caller is out of range.
+    /// Argument out of range.
     #[error("{name}: {reason}")]
     Invalid {
         name: &'static str,
-        /// The value, and what is accepted.
+        /// Value and accepted range.
         reason: String,
     },
 }
 
 impl BagError {
-    /// The same error of `file`: errors in a decompressed copy are those of the compressed file.
+    /// The same error for `file`: errors in a decompressed copy are reported for the compressed file.
     pub(crate) fn in_file(mut self, file: &Path) -> BagError {
         if let BagError::Io { path, .. }
         | BagError::Foreign { path, .. }

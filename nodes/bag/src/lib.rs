@@ -1,4 +1,4 @@
-//! rosbag2 directories: reading, writing and playing.
+//! Reading, writing and playing of rosbag2 bags.
 #![forbid(unsafe_code)]
 
 mod error;

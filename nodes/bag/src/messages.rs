@@ -10,29 +10,29 @@ use super::{
     zstd_files::decompress_message,
 };
 
-/// Compression of single messages.
+/// Compression of individual messages.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum MessageCompression {
-    /// They are not.
+    /// No message is compressed.
     None,
-    /// All are.
+    /// All messages are compressed.
     Zstd,
-    /// Unknown: those that start like a zstd frame are. CDR starts with a zero byte.
+    /// Unknown: messages that start like a zstd frame are decompressed. CDR starts with a zero byte.
     Detect,
 }
 
-/// Messages of a bag in order of log time. Holds one message per storage file that overlaps in
-/// time, and for MCAP the chunks that overlap. Ends after the first error.
+/// Messages of a bag in order of log time. Buffers one message per storage file that overlaps in
+/// time, and for MCAP the overlapping chunks. Ends after the first error.
 pub struct Messages {
     splits: Arc<[Split]>,
     topics: Arc<[TopicInfo]>,
-    /// By topics of the bag.
+    /// Filter by topics of the bag.
     filter: Filter,
     compression: MessageCompression,
-    /// Not yet opened, in order of time.
+    /// Unopened files, in order of time.
     pending: VecDeque<usize>,
     active: Vec<Active>,
-    /// True to end a file that is cut without an error.
+    /// True to end a truncated file without an error.
     past_cut: bool,
     messages_read: u64,
     unchecked: bool,
@@ -83,12 +83,12 @@ impl Messages {
         }
     }
 
-    /// True if the last message came from a damaged chunk, whose checksum is wrong.
+    /// True if the last message is of a damaged chunk, whose checksum is wrong.
     pub(crate) fn is_unchecked(&self) -> bool {
         self.unchecked
     }
 
-    /// Opens the next split if it may hold the next message.
+    /// Opens the next file if it may contain the next message.
     fn open_due(&mut self) -> Result<(), BagError> {
         while let Some(&index) = self.pending.front() {
             let Some(split) = self.splits.get(index) else {
@@ -98,7 +98,7 @@ impl Messages {
             let is_due = match (first_ns, split.range_ns) {
                 (None, _) => true,
                 (Some(first_ns), Some((start_ns, _))) => start_ns <= first_ns,
-                // Splits of unknown time follow each other.
+                // Files of unknown time follow each other.
                 (Some(_), None) => false,
             };
             if !is_due {
@@ -117,7 +117,7 @@ impl Messages {
             let head = stream.next();
             let head_ns = match &head {
                 Some(Ok(message)) => message.log_time_ns,
-                // A file that begins with damage keeps its place; one of unknown time has been reached.
+                // A file that begins with damage keeps its place; one of unknown time is reached now.
                 Some(Err(_)) => split.range_ns.map_or(i64::MIN, |(start_ns, _)| start_ns),
                 None => continue,
             };
@@ -133,7 +133,7 @@ impl Messages {
         Ok(())
     }
 
-    /// True for the error by which a cut file ends, where that is no error; the reader has warned of it.
+    /// True for the error at the end of a truncated file, where it is ignored; the reader has warned about it.
     fn is_passed_cut(&self, error: &BagError) -> bool {
         self.past_cut && !self.filter.past_damage && matches!(error, BagError::Truncated { .. })
     }
@@ -142,12 +142,12 @@ impl Messages {
         let files = self.active.iter().enumerate();
         let (index, _) = files.min_by_key(|(_, a)| (a.head_ns, a.order))?;
         let active = self.active.get_mut(index)?;
-        // Nothing is asked for behind an error.
+        // Nothing is read after an error.
         let next = match &active.head {
             Some(Err(_)) if !self.filter.past_damage => None,
             _ => active.stream.next(),
         };
-        // An error keeps its place behind the last message.
+        // An error keeps its place after the last message.
         if let Some(Ok(message)) = &next {
             active.head_ns = message.log_time_ns;
         }
@@ -163,7 +163,7 @@ impl Messages {
 }
 
 impl Active {
-    /// The message of this file as the bag's, decompressed.
+    /// The file's message as one of the bag, decompressed.
     fn of_bag(
         &self,
         message: Result<StorageMessage, BagError>,

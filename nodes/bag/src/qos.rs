@@ -1,24 +1,24 @@
-//! Quality of service in bags: integers up to metadata version 8, names from 9 on.
+//! QoS in bags: integers up to metadata version 8, names from 9 on.
 
 use serde::{Deserialize, Serialize};
 use serde_yaml::Value;
 
-/// The quality of service that one recorded publisher offered, as far as playing needs it.
+/// QoS offered by a recorded publisher, as far as playback needs it.
 #[derive(Clone, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 #[serde(from = "RecordedQos", into = "WrittenQos")]
 pub struct BagQos {
-    /// Keeps all samples, not only the newest `depth`.
+    /// Keep all samples, not only the newest `depth`.
     pub keep_all: bool,
-    /// Number of samples kept otherwise.
+    /// History depth otherwise.
     pub depth: u64,
-    /// Sends lost samples again.
+    /// Reliable.
     pub reliable: bool,
-    /// Keeps samples for late joiners (transient local).
+    /// Transient local.
     pub latched: bool,
 }
 
 impl Default for BagQos {
-    /// Keep the last 10, reliable, volatile.
+    /// Keep last 10, reliable, volatile.
     fn default() -> Self {
         BagQos {
             keep_all: false,
@@ -29,8 +29,8 @@ impl Default for BagQos {
     }
 }
 
-/// The policies that are read, by number or name; the others of a bag are passed over. One that is
-/// missing, null or of another type is that of most publishers.
+/// Policies that are read, by number or name; others are ignored. A missing, null or invalid policy
+/// has its most common value.
 #[derive(Deserialize)]
 struct RecordedQos {
     #[serde(default)]
@@ -58,7 +58,7 @@ impl From<RecordedQos> for BagQos {
     }
 }
 
-/// All policies as rosbag2 wants them; those that nothing here reads have no bound.
+/// All policies in the form of rosbag2; those not represented here are infinite.
 #[derive(Serialize)]
 struct WrittenQos {
     history: &'static str,
@@ -78,7 +78,7 @@ struct WrittenDuration {
     nsec: u64,
 }
 
-/// No bound: 2^63 - 1 ns.
+/// Infinite duration: 2^63 - 1 ns.
 const INFINITE: WrittenDuration = WrittenDuration {
     sec: 9_223_372_036,
     nsec: 854_775_807,
@@ -102,12 +102,12 @@ impl From<BagQos> for WrittenQos {
 }
 
 impl BagQos {
-    /// Parses the YAML list that storage files and metadata up to version 8 carry as text.
+    /// Parses the YAML list that storage files and metadata up to version 8 embed as text.
     pub(crate) fn parse_list(text: &str) -> Result<Vec<BagQos>, serde_yaml::Error> {
         Ok(crate::yaml::from_text::<Option<Vec<BagQos>>>(text)?.unwrap_or_default())
     }
 
-    /// The YAML list as storage files of metadata version 9 carry it.
+    /// YAML list as embedded in storage files of metadata version 9.
     pub(crate) fn to_text(list: &[BagQos]) -> Result<String, serde_yaml::Error> {
         Ok(serde_yaml::to_string(list)?.trim_end().to_owned())
     }

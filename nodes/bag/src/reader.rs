@@ -17,16 +17,16 @@ use super::{
     topic::absolute_name,
 };
 
-/// Selection of messages by topic and time; the default is all.
+/// Message selection by topic and time; all by default.
 #[derive(Clone, Debug, Default)]
 pub struct ReadOptions {
-    /// Names of topics; all where nothing.
+    /// Topic names; `None`: all.
     pub topics: Option<Vec<String>>,
-    /// The first log time wanted, ns since the Unix epoch.
+    /// Start of the log time range, inclusive, ns since the Unix epoch.
     pub start_ns: Option<i64>,
-    /// The first log time no longer wanted, ns since the Unix epoch.
+    /// End of the log time range, exclusive, ns since the Unix epoch.
     pub end_ns: Option<i64>,
-    /// True to go on behind damage, each of which is an error among the messages.
+    /// True to continue after damages, each of which is an error among the messages.
     pub past_damage: bool,
 }
 
@@ -41,14 +41,14 @@ pub struct BagReader {
     ros_distro: String,
     splits: Arc<[Split]>,
     compression: MessageCompression,
-    /// True to end a file that is cut without an error.
+    /// True to end a truncated file without an error.
     past_cut: bool,
 }
 
 impl BagReader {
     /// Opens a rosbag2 directory, with or without `metadata.yaml`, or a bare storage file.
     ///
-    /// A damaged bag opens, with a warning, if anything of it can be read.
+    /// A damaged bag opens with a warning if any part of it is readable.
     pub fn open(path: &Path) -> Result<BagReader, BagError> {
         let examined = fs::metadata(path).map_err(BagError::io(path, "open"))?;
         if !examined.is_dir() {
@@ -67,37 +67,37 @@ impl BagReader {
         Self::assemble(path, Some(metadata), splits)
     }
 
-    /// The topics; messages refer to them by index.
+    /// Topics; messages refer to them by index.
     pub fn topics(&self) -> &[TopicInfo] {
         &self.topics
     }
 
-    /// The first log time, ns since the Unix epoch; nothing without messages.
+    /// First log time, ns since the Unix epoch; `None` without messages.
     pub fn start_ns(&self) -> Option<i64> {
         self.range_ns.map(|(start_ns, _)| start_ns)
     }
 
-    /// The last log time, ns since the Unix epoch; nothing without messages.
+    /// Last log time, ns since the Unix epoch; `None` without messages.
     pub fn end_ns(&self) -> Option<i64> {
         self.range_ns.map(|(_, end_ns)| end_ns)
     }
 
-    /// Number of messages by the storage files; by `metadata.yaml` while compressed ones are not read.
+    /// Number of messages by the storage files; by `metadata.yaml` while compressed files are closed.
     pub fn message_count(&self) -> u64 {
         self.message_count
     }
 
-    /// Number of messages by `metadata.yaml`, if it counts others than the storage files, of all or of a topic.
+    /// Number of messages by `metadata.yaml`, if its counts differ from the storage files, in total or for a topic.
     pub fn miscounted(&self) -> Option<u64> {
         self.miscounted
     }
 
-    /// The storage files in order of time.
+    /// Storage files in order of time.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
         self.splits.iter().map(|split| split.path.as_path())
     }
 
-    /// Storage plugin of the files.
+    /// Storage format of the files.
     pub fn storage(&self) -> Storage {
         match self.is_sqlite() {
             true => Storage::Sqlite3,
@@ -105,18 +105,18 @@ impl BagReader {
         }
     }
 
-    /// ROS distribution of the recorder; empty where `metadata.yaml` names none.
+    /// ROS distribution of the recorder; empty if `metadata.yaml` does not state it.
     pub fn ros_distro(&self) -> &str {
         &self.ros_distro
     }
 
-    /// Rows of SQLite files that are no messages and are left out: of no topic, without time or content.
+    /// Invalid rows of SQLite files, which are skipped: without topic, time or content.
     pub fn implausible_rows(&self) -> u64 {
         let open = self.splits.iter().filter_map(|split| split.open.as_ref());
         open.map(|open| open.info().implausible).sum()
     }
 
-    /// The same bag, whose cut files end without an error: what is in [`BagReader::cuts`].
+    /// The same bag, whose truncated files end without an error; see [`BagReader::cuts`].
     pub fn past_cut(self) -> BagReader {
         BagReader {
             past_cut: true,
@@ -124,27 +124,27 @@ impl BagReader {
         }
     }
 
-    /// Files that end early, each with the number of its messages.
+    /// Truncated files, each with the number of its messages.
     pub fn cuts(&self) -> Vec<String> {
         let damages = self.splits.iter().filter_map(Split::damage);
         let is_cut = |damage: &BagError| matches!(damage, BagError::Truncated { .. });
         damages.filter(is_cut).map(|cut| cut.cause()).collect()
     }
 
-    /// Messages by the counts of the storage files themselves; nothing where one of them is damaged.
+    /// Number of messages by the storage files; `None` if one of them is damaged.
     pub(crate) fn claimed(&self) -> Option<u64> {
         let of = |split: &Split| split.open.as_ref()?.claimed();
         self.splits.iter().map(of).sum()
     }
 
-    /// True if all storage files are of SQLite.
+    /// True if all storage files are SQLite.
     pub(crate) fn is_sqlite(&self) -> bool {
         self.splits.iter().all(|split| is_sqlite(&split.path))
     }
 
-    /// The wanted messages in order of log time across all files, with bounded memory.
+    /// Selected messages in order of log time across all files, with bounded memory.
     ///
-    /// A damaged bag yields what precedes the damage, then the error. A file that is cut ends without one in a folder
+    /// A damaged bag yields the messages before the damage, then the error. A truncated file ends without one in a folder
     /// without `metadata.yaml`, whose recorder was killed, and after [`BagReader::past_cut`]. Unknown topics are an error.
     pub fn messages(&self, options: &ReadOptions) -> Result<Messages, BagError> {
         let names = options.topics.as_deref();
@@ -163,7 +163,7 @@ impl BagReader {
         Messages::new(splits, topics, filter, self.compression, self.past_cut)
     }
 
-    /// Refuses names of topics that the bag lacks.
+    /// Rejects topic names that the bag lacks.
     pub(crate) fn expect_topics(&self, names: &[String]) -> Result<(), BagError> {
         let known: Vec<&str> = self.topics.iter().map(|t| t.name.as_str()).collect();
         match names.iter().find(|name| !known.contains(&name.as_str())) {
@@ -196,7 +196,7 @@ impl BagReader {
         let listed = listed_topics(metadata.as_ref());
         let mut topics = listed.clone();
         if all_open {
-            // The storage counts its messages itself.
+            // Storage files count their own messages.
             (topics.iter_mut()).for_each(|topic| topic.message_count = 0);
         }
         let mut places = TopicIndex::new(&topics);
@@ -215,11 +215,11 @@ impl BagReader {
                 .map_or(0, |open| open.info().implausible);
             if rows > 0 {
                 let path = split.path.display();
-                log::warn!("{path}: {rows} rows are no messages and left out");
+                log::warn!("{path}: {rows} rows are not valid messages and are skipped");
             }
         }
         if !all_open {
-            // Of some files only.
+            // Known for some files only.
             (topics.iter_mut()).for_each(|topic| topic.message_bytes = None);
         }
         let listed_ns = metadata.as_ref().and_then(Metadata::range_ns);
@@ -240,7 +240,7 @@ impl BagReader {
         if let Some(claimed) = miscounted {
             let path = path.display();
             log::warn!(
-                "{path}: metadata.yaml counts {claimed} messages, the storage files {count}; theirs are taken \
+                "{path}: metadata.yaml counts {claimed} messages, the storage files {count}; the latter are used \
                  (topics counted otherwise: {})",
                 shown(&wrong)
             );
@@ -271,7 +271,7 @@ fn shown(names: &[&str]) -> String {
     }
 }
 
-/// The topics of `metadata.yaml`.
+/// Topics of `metadata.yaml`.
 fn listed_topics(metadata: Option<&Metadata>) -> Vec<TopicInfo> {
     let listed = metadata
         .map(|m| m.topics_with_message_count.as_slice())

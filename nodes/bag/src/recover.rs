@@ -1,4 +1,4 @@
-//! A damaged bag as a sound one: all that can be read of it, and what is lost.
+//! Recovery of a damaged bag: copies everything readable, and reports the losses.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fs;
@@ -13,25 +13,25 @@ use super::{
     split_list::{is_storage, list},
 };
 
-/// Damages that are told one by one.
+/// Limit of damages described individually.
 const MAX_TOLD: usize = 100;
 
-/// Outcome of a recovery.
+/// Result of a recovery.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Recovered {
-    /// Messages of the new bag.
+    /// Messages in the new bag.
     pub messages: u64,
-    /// Those among them that come from stretches of MCAP whose checksum is wrong; some may be altered.
+    /// Messages among them with a wrong checksum (MCAP), which may be altered.
     pub unchecked: Vec<Unchecked>,
-    /// Messages that the damaged one held, by `metadata.yaml` or an index, where either can be read.
+    /// Number of messages in the damaged bag by `metadata.yaml` or an index, if readable.
     pub claimed: Option<u64>,
-    /// Messages of those that the new bag lacks; nothing where none of them are counted.
+    /// Messages missing in the new bag; `None` if their number is unknown.
     pub lost: Option<u64>,
-    /// Messages that were read and that no bag can hold.
+    /// Messages read that are not representable in a bag.
     pub refused: u64,
-    /// Damages, the first hundred in words.
+    /// Number of damages.
     pub damages: u64,
-    /// Words for them.
+    /// Descriptions of the first hundred damages.
     pub told: Vec<String>,
 }
 
@@ -45,7 +45,7 @@ pub struct Unchecked {
 }
 
 impl Recovered {
-    /// True if nothing can be read of a bag that is damaged.
+    /// True if nothing is readable in a damaged bag.
     pub fn is_nothing(&self) -> bool {
         self.messages == 0 && (self.damages > 0 || self.refused > 0 || self.claimed > Some(0))
     }
@@ -58,10 +58,10 @@ impl Recovered {
     }
 }
 
-/// Writes what can be read of a bag as another one at `out`, which must not be there yet.
+/// Writes the readable part of a bag to a new one at `out`, which must not exist.
 ///
-/// Rows of SQLite are read one by one behind damage. Of chunks of MCAP whose checksum is wrong, the messages
-/// that can be told apart are taken unless they are compressed. Of nothing no bag is made.
+/// Rows of SQLite files are read individually after a damage. From MCAP chunks with a wrong checksum,
+/// uncompressed messages are recovered individually. Without any message no bag is created.
 pub fn recover(bag: &Path, out: &Path) -> Result<Recovered, BagError> {
     let mut recovered = Recovered::default();
     let readers = readers(bag, &mut recovered)?;
@@ -129,7 +129,7 @@ pub fn recover(bag: &Path, out: &Path) -> Result<Recovered, BagError> {
     Ok(recovered)
 }
 
-/// Readers of the bag: one, or one of each storage file where the whole does not open.
+/// Readers of the bag: one, or one per storage file if the bag does not open.
 fn readers(bag: &Path, recovered: &mut Recovered) -> Result<Vec<BagReader>, BagError> {
     let metadata = Metadata::read(&bag.join("metadata.yaml")).ok();
     recovered.claimed = metadata.map(|metadata| metadata.message_count);
@@ -167,7 +167,7 @@ fn readers(bag: &Path, recovered: &mut Recovered) -> Result<Vec<BagReader>, BagE
     }
 }
 
-/// The topic of the new bag, added where it is not there yet.
+/// Index of the topic in the new bag, added if needed.
 fn add(
     writer: &mut BagWriter,
     known: &mut HashMap<(String, String), usize>,
@@ -192,7 +192,7 @@ fn add(
     Ok(place)
 }
 
-/// True for a file of SQLite, packed or not.
+/// True for an SQLite file, compressed or not.
 pub(crate) fn is_sqlite(path: &Path) -> bool {
     let named = path.to_string_lossy().contains(".db3");
     identify(path).map_or(named, |kind| match kind {

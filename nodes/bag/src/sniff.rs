@@ -1,17 +1,17 @@
-//! Kind of a file by its first bytes.
+//! File type detection by the first bytes.
 
 use std::{fs::File, io::Read, path::Path};
 
 use super::BagError;
 
-/// The magic at both ends of an MCAP file.
+/// Magic at both ends of an MCAP file.
 pub(crate) const MCAP_MAGIC: &[u8] = mcap::MAGIC;
-/// The magic of a zstd frame.
+/// Magic of a zstd frame.
 pub(crate) const ZSTD_MAGIC: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
-/// The magic of a SQLite database.
+/// Magic of an SQLite database.
 pub(crate) const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
 
-/// The kinds of file that a bag may hold.
+/// Types of storage files.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum FileKind {
     Mcap,
@@ -24,7 +24,7 @@ const ROS_1: &str = "convert it with `rosbags-convert --src FILE --dst FOLDER`";
 const CAPTURE: &str = "replay it through the sensor's ROS 2 driver and record that";
 const METADATA: &str = "give the folder that holds it";
 
-/// Kinds of file that people give for a bag: first bytes, name, remedy.
+/// File types that are mistaken for a bag: first bytes, name, remedy.
 const FOREIGN: &[(&[u8], &str, &str)] = &[
     (b"#ROSBAG V", "a ROS 1 bag", ROS_1),
     (b"\x89PNG", "a PNG image", NO_BAG),
@@ -52,9 +52,9 @@ const FOREIGN: &[(&[u8], &str, &str)] = &[
     (b"ply\n", "a PLY file", NO_BAG),
 ];
 
-/// Identifies the file at `path`, or says what else it is.
+/// Identifies the file at `path`, or names its actual type in the error.
 ///
-/// Of unknown first bytes, which damage may have changed, the name counts.
+/// Unknown first bytes may be damaged; then the extension decides.
 pub(crate) fn identify(path: &Path) -> Result<FileKind, BagError> {
     let mut head = Vec::new();
     let file = File::open(path).map_err(BagError::io(path, "open"))?;
@@ -85,7 +85,7 @@ pub(crate) fn identify(path: &Path) -> Result<FileKind, BagError> {
     })
 }
 
-/// True for bytes that neither a kind of file nor a text begins with.
+/// True for bytes that start neither a known file type nor a text.
 fn is_unknown(head: &[u8]) -> bool {
     let kinds = [MCAP_MAGIC, SQLITE_MAGIC, ZSTD_MAGIC].into_iter();
     let is_kind = |magic: &[u8]| head.starts_with(magic) || magic.starts_with(head);

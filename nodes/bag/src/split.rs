@@ -1,4 +1,4 @@
-//! One storage file of a bag, opened at once or, where compressed, when its time comes.
+//! One storage file of a bag, opened at once or, if compressed, on demand.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use super::{
     zstd_files::decompress_file,
 };
 
-/// A storage file whose contents are known.
+/// An indexed storage file.
 pub(crate) enum OpenFile {
     Mcap(McapFile),
     Sqlite(SqliteFile),
@@ -47,7 +47,7 @@ impl OpenFile {
         }
     }
 
-    /// Messages that the file held, by its own count; nothing where that is damaged.
+    /// Number of messages by the file itself; `None` if it is damaged.
     pub(crate) fn claimed(&self) -> Option<u64> {
         match self {
             OpenFile::Mcap(file) => file.claimed,
@@ -62,7 +62,7 @@ impl OpenFile {
         }
     }
 
-    /// The wanted messages, and the bag's topic of each of the file's topics.
+    /// Selected messages, and the bag's topic of each of the file's topics.
     pub(crate) fn wanted(
         &self,
         path: &Path,
@@ -96,15 +96,15 @@ impl OpenFile {
 /// A storage file in the order of the bag.
 pub(crate) struct Split {
     pub(crate) path: PathBuf,
-    /// Nothing where it is compressed and not yet needed.
+    /// `None` while it is compressed and not needed.
     pub(crate) open: Option<OpenFile>,
-    /// First and last log time, where known.
+    /// First and last log time, if known.
     pub(crate) range_ns: Option<(i64, i64)>,
     pub(crate) message_count: Option<u64>,
 }
 
 impl Split {
-    /// Damage of the file; all before it can be read.
+    /// Damage of the file; everything before it is readable.
     pub(crate) fn damage(&self) -> Option<BagError> {
         let damage = self.open.as_ref()?.info().damage.clone()?;
         Some(damage.in_file(&self.path))

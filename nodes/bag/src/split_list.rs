@@ -1,4 +1,4 @@
-//! The storage files of a bag: those that `metadata.yaml` lists, or those in the folder.
+//! Storage files of a bag: those listed in `metadata.yaml`, or those in the folder.
 
 use std::{
     fs,
@@ -7,12 +7,12 @@ use std::{
 
 use super::{BagError, metadata::Metadata, split::Split};
 
-/// Bags of more storage files than this are refused.
+/// Limit of storage files per bag.
 const MAX_FILES: usize = 100_000;
 
-/// The storage files that the metadata lists, in its order; those in the folder if none of them is there.
+/// Storage files in the order of the metadata; those in the folder if none of the listed ones exists.
 ///
-/// Compressed files but the first stay closed while the counts of the metadata are credible.
+/// Compressed files except the first stay closed while the counts of the metadata are consistent.
 pub(crate) fn listed_splits(
     folder: &Path,
     metadata: &Metadata,
@@ -21,7 +21,7 @@ pub(crate) fn listed_splits(
     too_many(folder, metadata.relative_file_paths.len())?;
     let mut files = metadata.storage_paths(folder, metadata_path)?;
     for (_, file) in &mut files {
-        // Some versions of rosbag2 list compressed files by their names before compression.
+        // Some versions of rosbag2 list compressed files by their uncompressed names.
         let packed = file.with_added_extension("zstd");
         if !file.exists() && packed.exists() {
             *file = packed;
@@ -31,7 +31,7 @@ pub(crate) fn listed_splits(
     if !is_there && list(folder)?.any(|entry| entry.is_ok_and(|(_, name)| is_storage(&name))) {
         let (path, count) = (metadata_path.display(), files.len());
         log::warn!(
-            "{path}: none of the {count} files that it lists is there; those in the folder are read"
+            "{path}: none of the {count} listed files exists; the files in the folder are read"
         );
         return splits_in(folder);
     }
@@ -57,7 +57,7 @@ pub(crate) fn listed_splits(
     Ok(splits)
 }
 
-/// The storage files of a bag without `metadata.yaml`, in the order of their numbers.
+/// Storage files of a bag without `metadata.yaml`, in the order of their numbers.
 pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
     let mut files = Vec::new();
     for entry in list(folder)? {
@@ -76,7 +76,7 @@ pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
         });
     }
     files.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
-    // Of one that was being replaced by its compressed form, which then is whole, the latter counts.
+    // If both forms exist, compression had finished: the compressed one is complete.
     let packed = |path: &PathBuf| files.contains(&path.with_added_extension("zstd"));
     let twice: Vec<PathBuf> = files.iter().filter(|path| packed(path)).cloned().collect();
     files.retain(|path| !twice.contains(path));
@@ -86,7 +86,7 @@ pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
         .collect()
 }
 
-/// Refuses a file that is a link out of the bag.
+/// Rejects a link to a file outside the bag.
 fn inside(folder: &Path, file: &Path) -> Result<(), BagError> {
     let real = |path: &Path| fs::canonicalize(path).map_err(BagError::io(path, "locate"));
     if real(file)?.starts_with(real(folder)?) {
@@ -129,7 +129,7 @@ pub(crate) fn list(
     }))
 }
 
-/// Sorts by start; files of unknown time keep their place behind the one before.
+/// Sorts by start time; files of unknown time stay behind their predecessors.
 pub(crate) fn in_order_of_time(splits: Vec<Split>) -> Vec<Split> {
     let mut place_ns = i64::MIN;
     let mut keyed: Vec<(i64, Split)> = Vec::with_capacity(splits.len());

@@ -1,4 +1,4 @@
-//! Parts common to the readers of the storage files.
+//! Common parts of the storage readers.
 
 use std::collections::HashMap;
 
@@ -11,7 +11,7 @@ pub(crate) struct StorageInfo {
     pub message_count: u64,
     /// First and last log time.
     pub range_ns: Option<(i64, i64)>,
-    /// Rows that are no messages: of no topic or time, or without content.
+    /// Invalid message rows: without topic, time or content.
     pub implausible: u64,
     pub damage: Option<BagError>,
 }
@@ -21,24 +21,24 @@ pub(crate) struct StorageMessage {
     /// Index into the file's topics.
     pub topic: usize,
     pub log_time_ns: i64,
-    /// True of a damaged stretch: its checksum is wrong, or there is none.
+    /// True in a damaged part: its checksum is wrong or missing.
     pub unchecked: bool,
     pub data: Vec<u8>,
 }
 
-/// Messages in order of log time; nothing behind the first error counts.
+/// Messages in order of log time; nothing follows the first error.
 pub(crate) type StorageStream = Box<dyn Iterator<Item = Result<StorageMessage, BagError>> + Send>;
 
 /// Selection of messages by topic and time.
 #[derive(Clone, Debug)]
 pub(crate) struct Filter {
-    /// By index of the file's topics.
+    /// Selected topics, by index of the file's topics.
     pub topics: Vec<bool>,
-    /// The first log time wanted.
+    /// Start of the log time range, inclusive.
     pub start_ns: i64,
-    /// The first log time no longer wanted.
+    /// End of the log time range, exclusive.
     pub end_ns: Option<i64>,
-    /// True to go on behind damage.
+    /// True to continue after damage.
     pub past_damage: bool,
 }
 
@@ -53,17 +53,17 @@ impl Filter {
         self.topics.get(topic).copied().unwrap_or(false)
     }
 
-    /// Overlap of the wanted times with a closed range.
+    /// True if the selected range overlaps a closed range.
     pub(crate) fn overlaps(&self, (first_ns, last_ns): (i64, i64)) -> bool {
         last_ns >= self.start_ns && self.end_ns.is_none_or(|end_ns| first_ns < end_ns)
     }
 }
 
-/// Topics by name and type; an empty type is any.
+/// Topics by name and type; an empty type matches any.
 #[derive(Default)]
 pub(crate) struct TopicIndex {
     by_type: HashMap<(String, String), usize>,
-    /// The first of each name.
+    /// First topic of each name.
     by_name: HashMap<String, usize>,
 }
 
@@ -82,7 +82,7 @@ impl TopicIndex {
         self.by_name.entry(name.to_owned()).or_insert(at);
     }
 
-    /// The first topic of this name and type.
+    /// First topic of this name and type.
     pub(crate) fn find(&self, name: &str, type_name: &str) -> Option<usize> {
         if type_name.is_empty() {
             return self.by_name.get(name).copied();
@@ -94,14 +94,14 @@ impl TopicIndex {
         of(type_name).into_iter().chain(of("")).min()
     }
 
-    /// The topic has its type now.
+    /// Sets the type of a topic.
     fn complete(&mut self, at: usize, name: &str, type_name: &str) {
         self.by_type.remove(&(name.to_owned(), String::new()));
         self.add(at, name, type_name);
     }
 }
 
-/// Adds a topic to those known, or completes the same one; the result is its index.
+/// Adds or completes a topic; returns its index.
 pub(crate) fn merge_topic(
     topics: &mut Vec<TopicInfo>,
     places: &mut TopicIndex,
@@ -133,15 +133,15 @@ pub(crate) fn merge_topic(
     index
 }
 
-/// Offered profiles embedded in a storage file; unusable text counts as unknown.
+/// QoS profiles embedded in a storage file; an invalid text counts as unknown.
 pub(crate) fn lenient_qos(topic: &str, text: &str) -> Vec<BagQos> {
     BagQos::parse_list(text).unwrap_or_else(|error| {
-        log::warn!("{topic}: offered_qos_profiles cannot be read ({error}); taken as unknown");
+        log::warn!("{topic}: invalid offered_qos_profiles ({error}); QoS is unknown");
         Vec::new()
     })
 }
 
-/// `pkg/Type`, as some writers have it, becomes `pkg/msg/Type`.
+/// Full type name: `pkg/Type` of some writers becomes `pkg/msg/Type`.
 pub(crate) fn full_type_name(name: &str) -> String {
     match name.split_once('/') {
         Some((package, rest)) if !rest.contains('/') => format!("{package}/msg/{rest}"),
@@ -149,7 +149,7 @@ pub(crate) fn full_type_name(name: &str) -> String {
     }
 }
 
-/// Language of a message definition, as storage files name it.
+/// Language of a message definition, as named in storage files.
 pub(crate) fn definition_encoding(text: &str) -> &'static str {
     match text {
         "" => "",

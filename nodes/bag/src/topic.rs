@@ -2,13 +2,13 @@
 
 use super::BagQos;
 
-/// Larger messages are refused, bytes.
+/// Largest accepted message, bytes.
 pub(crate) const MAX_MESSAGE_BYTES: u64 = 1 << 30;
 
-/// Messages of static transforms that a late joiner is given: the depth of tf2's listeners.
+/// Static transform messages kept for late joiners: the depth of tf2's listeners.
 pub const STATIC_DEPTH: u64 = 100;
 
-/// The storage plugins of rosbag2.
+/// Storage formats of rosbag2.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Storage {
     /// MCAP files.
@@ -18,7 +18,7 @@ pub enum Storage {
 }
 
 impl Storage {
-    /// The plugin's name in `metadata.yaml`.
+    /// Name of the storage plugin in `metadata.yaml`.
     pub fn identifier(self) -> &'static str {
         match self {
             Storage::Mcap => "mcap",
@@ -26,7 +26,7 @@ impl Storage {
         }
     }
 
-    /// The extension of its files.
+    /// Extension of its files.
     pub fn extension(self) -> &'static str {
         match self {
             Storage::Mcap => "mcap",
@@ -38,38 +38,38 @@ impl Storage {
 /// A topic of a bag.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct TopicInfo {
-    /// The topic's name, such as "/tf": with a leading slash, also where the bag lacks it.
+    /// Topic name with a leading slash, such as "/tf", even if the bag lacks the slash.
     pub name: String,
-    /// The type, such as "sensor_msgs/msg/PointCloud2"; empty where the bag lacks it.
+    /// Type, such as "sensor_msgs/msg/PointCloud2"; empty if missing in the bag.
     pub type_name: String,
-    /// Hash of the type, such as "RIHS01_..."; empty where the bag lacks it.
+    /// Type hash, such as "RIHS01_..."; empty if missing in the bag.
     pub type_hash: String,
-    /// Serialisation of its messages; "cdr" for ROS 2.
+    /// Serialization format; "cdr" for ROS 2.
     pub serialization_format: String,
-    /// QoS that each recorded publisher offered; empty where the bag lacks it.
+    /// QoS offered by each recorded publisher; empty if missing in the bag.
     pub offered_qos: Vec<BagQos>,
-    /// The message definition embedded in the bag (ros2msg or ros2idl text).
+    /// Embedded message definition (ros2msg or ros2idl text).
     pub definition: Option<String>,
-    /// Number of its messages, by the bag's index.
+    /// Number of messages by the bag's index.
     pub message_count: u64,
-    /// Bytes of its messages as they are stored; nothing where the bag's index lacks it, as that of MCAP does.
+    /// Stored bytes of its messages; `None` if the index lacks them, as in MCAP.
     pub message_bytes: Option<u64>,
 }
 
 impl TopicInfo {
-    /// True if late joiners expect the last messages of this topic.
+    /// True for a topic with latched messages.
     pub fn is_latched(&self) -> bool {
         self.has_static_transforms() || self.offered_qos.iter().any(|qos| qos.latched)
     }
 
-    /// True for `/tf_static` in any namespace. Its messages are latched and hold at all times, whatever QoS the bag
-    /// notes: up to metadata version 3 it notes none, and converters write the default.
+    /// True for `/tf_static` in any namespace. Its messages are latched and valid at all times, regardless of the recorded
+    /// QoS: metadata up to version 3 has none, and converters write the default.
     pub fn has_static_transforms(&self) -> bool {
         self.name.ends_with("/tf_static") && self.type_name == "tf2_msgs/msg/TFMessage"
     }
 }
 
-/// The name of a topic with its leading slash, which writers other than rosbag2 leave out.
+/// Topic name with a leading slash, which some writers omit.
 pub(crate) fn absolute_name(name: &str) -> String {
     match name {
         "" => String::new(),
@@ -83,7 +83,7 @@ pub(crate) fn absolute_name(name: &str) -> String {
 pub struct BagMessage {
     /// Index into the reader's topics.
     pub topic: usize,
-    /// Time of its recording, ns since the Unix epoch.
+    /// Time of recording, ns since the Unix epoch.
     pub log_time_ns: i64,
     /// CDR with encapsulation header.
     pub data: Vec<u8>,

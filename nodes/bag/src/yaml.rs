@@ -1,12 +1,12 @@
-//! YAML of bags, which anybody may have written: nesting is bounded before the parser sees it, whose time
+//! YAML of bags from untrusted sources: nesting is bounded before parsing, whose time
 //! grows with the square of the depth.
 
 use serde::de::{DeserializeOwned, Error};
 
-/// Brackets open at a time; rosbag2 needs four.
+/// Limit of open brackets; rosbag2 needs four.
 const MAX_DEPTH: usize = 64;
 
-/// Parses a text, without the byte order mark that some editors put before it.
+/// Parses a text, without a byte order mark.
 pub(crate) fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, serde_yaml::Error> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut depth = 0_usize;

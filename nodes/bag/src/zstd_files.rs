@@ -1,4 +1,4 @@
-//! zstd of whole storage files and of single messages, as rosbag2 applies it; the output is bounded.
+//! zstd compression of whole storage files and of individual messages, as in rosbag2; the output is bounded.
 
 use std::{
     fs::File,
@@ -11,7 +11,7 @@ use tempfile::{Builder, TempPath};
 
 use super::{BagError, MAX_MESSAGE_BYTES};
 
-/// A storage file may grow to this size, or by this factor, whichever is more; bytes.
+/// Limit of decompressed file size: this, or the compressed size times the ratio below, whichever is more; bytes.
 const MAX_FILE_BYTES: u64 = 4 << 30;
 const MAX_FILE_RATIO: u64 = 64;
 

@@ -1,8 +1,8 @@
-//! Dates and durations for people.
+//! Human-readable dates and durations.
 
-/// Year, month, day, hour, minute and second of seconds since 1970, UTC.
+/// Year, month, day, hour, minute and second (UTC) of seconds since 1970.
 ///
-/// In the Gregorian calendar whose years begin in March.
+/// Uses the Gregorian calendar with years that begin in March.
 pub fn utc(seconds: u64) -> [u64; 6] {
     let (days, second) = (seconds / 86_400 + 719_468, seconds % 86_400);
     let (era, day_of_era) = (days / 146_097, days % 146_097);
@@ -23,9 +23,9 @@ pub fn utc(seconds: u64) -> [u64; 6] {
     ]
 }
 
-/// ISO 8601 date and time of ns since 1970, UTC, to the millisecond before.
+/// ISO 8601 date and time (UTC) of ns since 1970, truncated to milliseconds.
 pub fn iso_8601(ns: i64) -> String {
-    // Bags hold no time before 1970.
+    // Bags have no times before 1970.
     let ns = u64::try_from(ns).unwrap_or(0);
     let [year, month, day, hour, minute, second] = utc(ns / 1_000_000_000);
     let ms = ns / 1_000_000 % 1000;
@@ -37,7 +37,7 @@ pub fn duration(seconds: f64) -> String {
     if seconds < 60.0 {
         return format!("{seconds:.3} s");
     }
-    // In tenths, so that no 59.96 s are shown as 60.0.
+    // Rounded to tenths first, so that 59.96 s is not shown as 60.0.
     let tenths = (seconds * 10.0).round() as u64;
     let (minutes, rest) = (tenths / 600, (tenths % 600) as f64 / 10.0);
     match minutes / 60 {

@@ -1,4 +1,4 @@
-//! Options for the size of the cells.
+//! Cell size options.
 
 use clap::Args;
 use lattice_nodes::lattice_mapper::cube_m3;
@@ -6,11 +6,11 @@ use lattice_nodes::lattice_mapper::cube_m3;
 /// Smallest and largest cell size, m; the lattice has the same bounds as volumes.
 const BOUNDS_M: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 
-/// Size of the cells, by one of two options.
+/// Cell size, by one of two options.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct CellSize {
-    /// Edge of the cube with the volume of one cell, m; 0.5, which is --cell-volume 0.125, where neither is given and no
-    /// parameter says else
+    /// Edge of the cube with the volume of one cell, m; default 0.5 (--cell-volume 0.125), unless set by a
+    /// parameter
     #[arg(long, value_name = "M", value_parser = size)]
     pub cell_size: Option<f64>,
     /// Volume of one cell, m^3
@@ -19,12 +19,12 @@ pub struct CellSize {
 }
 
 impl CellSize {
-    /// The volume that is asked for, m^3.
+    /// Requested volume, m^3.
     pub fn volume_m3(&self) -> Option<f64> {
         self.cell_volume.or(self.cell_size.map(cube_m3))
     }
 
-    /// Fails, and says why, if one is given where the cells are known.
+    /// Fails with a reason if a size is given where the cells are fixed.
     #[cfg(feature = "viewer")]
     pub fn expect_none(&self, why: &str) -> Result<(), String> {
         let option = match (self.cell_size, self.cell_volume) {
@@ -32,11 +32,11 @@ impl CellSize {
             (None, Some(_)) => "--cell-volume",
             (None, None) => return Ok(()),
         };
-        Err(format!("{option} has no use here: {why}"))
+        Err(format!("{option} has no effect here: {why}"))
     }
 }
 
-/// A cell size as it is typed.
+/// Typed cell size.
 pub fn size(text: &str) -> Result<f64, String> {
     let size_m: Option<f64> = text.parse().ok();
     let is_allowed = |size_m: &f64| BOUNDS_M.contains(size_m);

@@ -1,4 +1,4 @@
-//! `lattice fleet`: the program `lattice-fleet`, which is built apart.
+//! `lattice fleet`: runs the separate program `lattice-fleet`.
 
 use std::ffi::OsString;
 use std::io::ErrorKind;
@@ -31,7 +31,7 @@ impl Fleet {
         run(self.arguments)
     }
 
-    /// Runs a command of `lattice-fleet` that has another name here.
+    /// Runs a command of `lattice-fleet` under another name.
     pub fn run_as(self, command: &str) -> CliResult {
         let mut arguments = vec![command.into()];
         arguments.extend(self.arguments);
@@ -45,20 +45,20 @@ pub fn run(arguments: Vec<OsString>) -> CliResult {
     let status = Command::new(&program).args(&arguments).status();
     let status = status.map_err(|error| match error.kind() {
         ErrorKind::NotFound => format!(
-            "there is no program {PROGRAM}, which holds the data engine and is built apart: \
+            "the program {PROGRAM} with the data engine is not installed; it is built separately: \
              cargo install --path nodes/fleet"
         ),
         _ => format!("{}: {error}", program.display()),
     })?;
     match status.code() {
         Some(0) => Ok(()),
-        // It has said why.
+        // The program has printed the reason.
         Some(code) => std::process::exit(code),
         None => Err(format!("{PROGRAM} was killed: {status}").into()),
     }
 }
 
-/// The program beside this one, if it is there.
+/// The program beside this one, if it exists.
 fn beside_this() -> Option<PathBuf> {
     let path = std::env::current_exe().ok()?.with_file_name(PROGRAM);
     path.is_file().then_some(path)

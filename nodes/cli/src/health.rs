@@ -1,4 +1,4 @@
-//! `lattice health`: the state of nodes by what they say on `/diagnostics`.
+//! `lattice health`: health of nodes by their messages on `/diagnostics`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -8,23 +8,23 @@ use clap::Args;
 use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Runtime, WORKING};
+use lattice_runtime::{Runtime, SubscriptionExecutor, WORKING};
 
 use super::{CliResult, init_logging};
 
-/// Name of the node that asks.
+/// Name of the querying node.
 const NAME: &str = "lattice_health";
 
-/// Fail unless nodes are at work and well, by their diagnostics
+/// Fail unless nodes are running and healthy, by their diagnostics
 ///
-/// A node is not well if a task of it is an ERROR or STALE, or a WARN with the value `working: false`: a mapper says
-/// so until it has mapped a cloud. Other warnings are printed.
+/// A node is unhealthy if one of its tasks is ERROR or STALE, or WARN with the value `working: false`, such as a mapper
+/// before its first cloud. Other warnings are printed.
 #[derive(Args)]
 pub struct Health {
-    /// Full names of nodes, such as `lattice_mapper` or `robot/lattice_mapper`; if none is named, all that
-    /// are found to publish on /diagnostics
+    /// Full names of nodes, such as `lattice_mapper` or `robot/lattice_mapper`; by default all nodes
+    /// that publish on /diagnostics
     nodes: Vec<String>,
-    /// Longest wait for them, s; a node speaks each second
+    /// Timeout, s; nodes publish once a second
     #[arg(long, default_value_t = 5.0, value_name = "S")]
     timeout: f64,
     /// As for any ROS node: `-- --ros-args -r /diagnostics:=/robot/diagnostics ...`
@@ -32,10 +32,10 @@ pub struct Health {
     ros_args: Vec<String>,
 }
 
-/// Time that discovery has where no node is named; each that is well has spoken by then.
+/// Discovery time if no node is named; each running node has published by then.
 const FINDING: Duration = Duration::from_millis(1500);
 
-/// Highest level that each task of each node has stated last.
+/// Highest level of each task of each node in its last message.
 type Tasks = BTreeMap<String, DiagnosticStatus>;
 
 impl Health {
@@ -53,7 +53,7 @@ impl Health {
         let _subscription = node.subscribe::<DiagnosticArray>(
             "/diagnostics",
             Qos::DIAGNOSTICS,
-            Load::Small,
+            SubscriptionExecutor::Shared,
             handler,
         )?;
         let deadline = Instant::now()
@@ -90,14 +90,14 @@ impl Health {
         let silent = publishers().saturating_sub(sources.len());
         if self.nodes.is_empty() && silent > 0 {
             eprintln!(
-                "{silent} publishers of {topic} have said nothing in {} s",
+                "{silent} publishers of {topic} have published nothing in {} s",
                 self.timeout
             );
         }
         self.judge(&tasks)
     }
 
-    /// Nodes that have said nothing.
+    /// Nodes without a message.
     fn silent(&self, tasks: &Tasks) -> Vec<String> {
         if self.nodes.is_empty() {
             return match tasks.is_empty() {
@@ -114,7 +114,12 @@ impl Health {
     fn judge(&self, tasks: &Tasks) -> CliResult {
         let silent = self.silent(tasks);
         if !silent.is_empty() {
-            return Err(format!("no word from {} in {} s", silent.join(", "), self.timeout).into());
+            return Err(format!(
+                "no diagnostics from {} in {} s",
+                silent.join(", "),
+                self.timeout
+            )
+            .into());
         }
         let named = |task: &str| {
             let is = |node: &String| node.trim_start_matches('/') == node_of(task);
@@ -129,12 +134,12 @@ impl Health {
         }
         match ill.is_empty() {
             true => Ok(()),
-            false => Err(format!("not well: {}", ill.join(", ")).into()),
+            false => Err(format!("unhealthy: {}", ill.join(", ")).into()),
         }
     }
 }
 
-/// States in a message, but for our own.
+/// Statuses in a message, except our own.
 fn others(message: &DiagnosticArray) -> impl Iterator<Item = (String, DiagnosticStatus)> {
     let others = message
         .status
@@ -143,12 +148,12 @@ fn others(message: &DiagnosticArray) -> impl Iterator<Item = (String, Diagnostic
     others.map(|status| (status.name.clone(), status.clone()))
 }
 
-/// The node of a task, which is named `node: task`.
+/// Node of a task, which is named `node: task`.
 fn node_of(task: &str) -> &str {
     task.split_once(": ").map_or(task, |(node, _)| node)
 }
 
-/// False for a task that does not work, or that cannot do its work yet.
+/// False for a task that fails, or cannot do its work yet.
 fn is_well(status: &DiagnosticStatus) -> bool {
     let working = || status.values.iter().find(|value| value.key == WORKING);
     match status.level {

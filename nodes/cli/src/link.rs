@@ -1,4 +1,4 @@
-//! `lattice link`: a name for each node.
+//! `lattice link`: symbolic links named like the nodes.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -10,12 +10,12 @@ use crate::{CliResult, node};
 
 /// Options of `lattice link`.
 ///
-/// Called by the name of a node, this program is that node: `DIR/lattice_mapper --ros-args ...`.
+/// Called by the name of a node, this program runs that node: `DIR/lattice_mapper --ros-args ...`.
 #[derive(Args)]
 pub struct Link {
-    /// Directory of the links; made if it is not there
+    /// Directory of the links; created if missing
     dir: PathBuf,
-    /// Path that the links lead to [default: this program]
+    /// Target of the links [default: this program]
     #[arg(long, value_name = "PATH")]
     to: Option<PathBuf>,
 }
@@ -37,7 +37,7 @@ impl Link {
     }
 }
 
-/// Makes a link, in place of an older one but not of anything else.
+/// Creates a link; only an existing link is replaced.
 fn make(target: &Path, link: &Path) -> std::io::Result<()> {
     if fs::symlink_metadata(link).is_ok_and(|found| found.is_symlink()) {
         fs::remove_file(link)?;
@@ -45,7 +45,7 @@ fn make(target: &Path, link: &Path) -> std::io::Result<()> {
     std::os::unix::fs::symlink(target, link).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => std::io::Error::new(
             ErrorKind::AlreadyExists,
-            "something that is no link has this name: remove it, or link elsewhere",
+            "the name exists and is not a link: remove it, or use another directory",
         ),
         _ => error,
     })

@@ -34,7 +34,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use lattice_core::lattice::LatticeKind;
 
-/// Result of a command, with any error on its way to the user.
+/// Result of a command, with any error for the user.
 type CliResult<T = ()> = Result<T, Box<dyn Error + Send + Sync>>;
 
 /// Lattice voxel maps from logs and live robots.
@@ -47,45 +47,45 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Run several nodes in one process, as parameter files say
+    /// Run several nodes in one process, as given by parameter files
     Run(run::Run),
-    /// Show a map in the browser: of a map file, a point file or a log, or live
+    /// Show a map in the browser: a map file, a point file, a log, or a live map
     #[cfg(feature = "viewer")]
     View(view::View),
     /// Run one node
     Node(node::NodeCommand),
-    /// Fail unless nodes are at work and well, by their diagnostics; for health checks of containers
+    /// Fail unless nodes are running and healthy, by their diagnostics; for health checks of containers
     Health(health::Health),
-    /// Make a link to this program for every node, by whose name it is that node
+    /// Create a link to this program for every node; called by that name, it runs the node
     Link(link::Link),
-    /// Map a rosbag2 log: directly, or played through separate node processes
+    /// Map a rosbag2 log: in this process, or played to separate node processes
     #[cfg(feature = "bags")]
     Replay(replay::Replay),
     /// Record topics of any type as a rosbag2 log
     #[cfg(feature = "bags")]
     Record(Box<record::Record>),
-    /// Look after rosbag2 logs
+    /// Inspect and recover rosbag2 logs
     #[cfg(feature = "bags")]
     #[command(subcommand)]
     Bag(bag::Bag),
-    /// Quantize a point file (ply, pcd, las, laz, e57, bt, xyz, KITTI bin) and show what each lattice makes of it
+    /// Quantize a point file (ply, pcd, las, laz, e57, bt, xyz, KITTI bin) and compare lattices
     Quantize(quantize::Quantize),
-    /// Find where a cloud lies in a map, without a guess, and whether the answer holds
+    /// Find the pose of a cloud in a map, without a guess, with a verdict
     Calibrate(Box<calibrate::Calibrate>),
-    /// Look into map files and export them
+    /// Inspect and export map files
     #[command(subcommand)]
     Map(map::Map),
-    /// One map of many logs and robots, as tables on a data engine; needs the program lattice-fleet
+    /// Merge logs and robots into one map as tables on a data engine; needs the program lattice-fleet
     Fleet(fleet::Fleet),
     #[cfg(feature = "lab")]
     #[command(flatten)]
     Lab(lab::Lab),
 }
 
-/// Runs a node if the program was called by its name, the command line otherwise. Errors are one line
-/// on standard error and a non-zero status.
+/// Runs a node if the program was called by its name, the command line otherwise. An error is one line
+/// on standard error and a non-zero exit status.
 fn main() -> ExitCode {
-    // A limit of file sizes (`ulimit -f`) is an error of the write, as a full disk is.
+    // A file size limit (`ulimit -f`) becomes a write error, like a full disk.
     if let Err(error) = lattice_runtime::catch_file_size_signal() {
         eprintln!("lattice: SIGXFSZ cannot be caught: {error}");
     }
@@ -150,14 +150,14 @@ impl std::str::FromStr for Lattices {
     }
 }
 
-/// Log lines of the tools themselves; nodes have their own.
+/// Initializes the log of the tools; nodes have their own.
 fn init_logging() {
     let env = env_logger::Env::default().default_filter_or("warn");
     // A second command in one process (tests) keeps the first logger.
     let _ = env_logger::Builder::from_env(env)
         .format_timestamp(None)
         .format_target(false)
-        // Warns of short receive buffers, which matter where something is lost: commands say so then.
+        // Commands warn of short receive buffers only after a loss.
         .filter_module("lattice_runtime::shared::status", log::LevelFilter::Error)
         .try_init();
 }

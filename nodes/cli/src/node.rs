@@ -37,14 +37,14 @@ pub fn names() -> Vec<&'static str> {
     composable.collect()
 }
 
-/// The node, if the program was called by the name of one.
+/// The node, if the program was called by its name.
 pub fn called_as(program: Option<OsString>) -> Option<String> {
     let program = program?;
     let name = Path::new(&program).file_stem()?.to_str()?;
     names().contains(&name).then(|| name.to_owned())
 }
 
-/// Runs a node until it is stopped. `arguments` are those of the command line.
+/// Runs a node until it is stopped, with `arguments` of the command line.
 pub fn run(name: &str, arguments: impl IntoIterator<Item = String>) -> CliResult {
     #[cfg(feature = "bags")]
     if name == bag_player::NAME {

@@ -1,4 +1,4 @@
-//! Point files that commands quantize.
+//! Point files for quantization.
 
 use std::path::Path;
 
@@ -11,20 +11,20 @@ use nalgebra::Vector3;
 use crate::CliResult;
 use lattice_nodes::files::points::{BinLayout, PointFileOptions, read_points, why_empty};
 
-/// Most cells along the diagonal of a cloud whose cell size is chosen.
+/// Limit of cells along the diagonal for an automatic cell size.
 #[cfg(feature = "viewer")]
 const MOST_CELLS: f64 = 400.0;
 
 /// Columns of raw binary files.
 #[derive(Args, Clone, Copy, Default)]
 pub struct Columns {
-    /// Numbers of a point in a .bin file, x, y and z first: 3 to 64 floats, or as 3d doubles [default: 4, as KITTI]
+    /// Numbers per point in a .bin file, x, y and z first: 3 to 64 floats, or doubles, such as 3d [default: 4, as in KITTI]
     #[arg(long, value_name = "N")]
     columns: Option<BinLayout>,
 }
 
 impl Columns {
-    /// Options of reading files, one of which must be a .bin file if columns are given.
+    /// Options for reading files; columns require a .bin file among them.
     pub fn options(self, max_points: usize, paths: &[&Path]) -> CliResult<PointFileOptions> {
         let is_bin = |path: &&Path| {
             let name = path.to_string_lossy().to_ascii_lowercase();
@@ -45,16 +45,16 @@ impl Columns {
     }
 }
 
-/// The points of a file, one at least.
+/// Points of a file, at least one.
 pub struct Points {
     cloud: Cloud,
     labels: Vec<u16>,
     datum_m: Vector3<f64>,
-    /// Points left out because they are not finite.
+    /// Skipped points that are not finite.
     pub not_finite: u64,
-    /// Points left out because they are 0 0 0.
+    /// Removed points at 0 0 0.
     pub no_returns: u64,
-    /// Edge of the voxels whose centres the points are, m, if the file is an octree.
+    /// Voxel edge of an octree, whose points are voxel centres, m.
     voxel_m: Option<f64>,
 }
 
@@ -67,7 +67,7 @@ impl Points {
             return Err(format!("{}: {why}", path.display()).into());
         }
         let points: Vec<Vector3<f64>> = file.points_m.into_iter().map(Vector3::from).collect();
-        // Offsets from the middle keep the digits of far-away coordinates, whatever strays.
+        // Offsets from the median keep the precision of distant coordinates, robust to outliers.
         let datum_m = middle_m(&points);
         Ok(Points {
             cloud: Cloud::from_points(0, datum_m, &points),
@@ -79,7 +79,7 @@ impl Points {
         })
     }
 
-    /// The points on a lattice, with their labels on request.
+    /// Quantizes the points, optionally with labels.
     pub fn quantize(
         &self,
         lattice: Lattice,
@@ -90,7 +90,7 @@ impl Points {
             && lattice.cell_side_m() < 1.99 * edge_m
         {
             log::warn!(
-                "cells of {:.3} m have holes between the voxels of {edge_m} m of an octree: take a cell size of \
+                "cells of {:.3} m have holes between the voxels of {edge_m} m of an octree: use a cell size of \
                  {} m or more",
                 lattice.cell_side_m(),
                 2.0 * edge_m
@@ -105,7 +105,7 @@ impl Points {
         let report = list.insert_labelled(&self.cloud, &self.labels);
         if report.list_full > 0 {
             return Err(format!(
-                "{} points are beyond --max-voxels {max_voxels} on {kind}: allow more, or take larger cells",
+                "{} points exceed --max-voxels {max_voxels} on {kind}: raise it, or use larger cells",
                 report.list_full
             )
             .into());
@@ -113,10 +113,10 @@ impl Points {
         Ok((list, report))
     }
 
-    /// A cell size for looking at the points, m, and the reason for it.
+    /// Automatic cell size, m, and the reason for it.
     ///
-    /// Of an octree two of its voxels; else 1, 2 or 5 of a decimal place, such that a surface as large as the cloud has about as many cells
-    /// as there are points, and 400 cells along the diagonal at most.
+    /// Two voxels of an octree; else 1, 2 or 5 times a power of ten, such that a surface as large as the cloud has about as
+    /// many cells as there are points, with at most 400 cells along the diagonal.
     #[cfg(feature = "viewer")]
     pub fn usual_cell_m(&self) -> (f64, &'static str) {
         if let Some(edge_m) = self.voxel_m {
@@ -125,7 +125,7 @@ impl Points {
         let extent_m = Vector3::from_fn(|axis, _| {
             let coordinate = |p: &[f32; 3]| p.get(axis).copied().unwrap_or_default();
             let mut values: Vec<f32> = self.cloud.offsets_m.iter().map(coordinate).collect();
-            // Without the outermost hundredth, so that no stray points stretch it.
+            // Without the outer hundredth, so that outliers do not stretch it.
             let low = values.len() / 100;
             let high = values.len().saturating_sub(low + 1);
             let mut nth = |n| *values.select_nth_unstable_by(n, f32::total_cmp).1;
@@ -137,7 +137,7 @@ impl Points {
     }
 }
 
-/// The next of 1, 2 and 5 of a decimal place.
+/// Next larger 1, 2 or 5 times a power of ten.
 #[cfg(feature = "viewer")]
 fn round_up(size_m: f64) -> f64 {
     let exponent = size_m.max(1e-3).log10().floor() as i32;
@@ -146,7 +146,7 @@ fn round_up(size_m: f64) -> f64 {
     steps.find(|step| *step >= size_m).unwrap_or(size_m)
 }
 
-/// Median of each coordinate in whole kilometres, so that files about their origin keep it.
+/// Median of each coordinate in whole kilometres; zero for files near their origin.
 fn middle_m(points: &[Vector3<f64>]) -> Vector3<f64> {
     if points.is_empty() {
         return Vector3::zeros();

@@ -1,16 +1,16 @@
-//! Progress bars on standard error, hidden unless that is a terminal.
+//! Progress bars on standard error, hidden unless it is a terminal.
 
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A bar that goes from 0 to 1.
+/// Progress bar from 0 to 1.
 pub struct Progress(ProgressBar);
 
 const STEPS: u64 = 1000;
 
 impl Progress {
-    /// A bar with a name in front.
+    /// Progress bar with a name.
     pub fn new(name: &str) -> Self {
         let bar = ProgressBar::new(STEPS);
         if let Ok(style) =
@@ -23,13 +23,13 @@ impl Progress {
         Self(bar)
     }
 
-    /// Sets the share that is done.
+    /// Sets the completed fraction.
     pub fn set(&self, done: f64) {
         self.0
             .set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
     }
 
-    /// Sets the text behind the bar.
+    /// Sets the text after the bar.
     pub fn say(&self, text: &str) {
         self.0.set_message(text.to_owned());
     }

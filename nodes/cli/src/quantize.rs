@@ -1,4 +1,4 @@
-//! `lattice quantize`: statistics of a point file on each lattice.
+//! `lattice quantize`: quantization statistics of a point file on each lattice.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::cell_size::CellSize;
 use super::points::{Columns, Points};
 use super::{CliResult, Lattices, init_logging};
-use lattice_nodes::files::whole;
+use lattice_nodes::files::atomic_write;
 
 /// Quantize a point file
 #[derive(Args)]
@@ -18,23 +18,23 @@ pub struct Quantize {
     /// ply, pcd, las, laz, e57, bt (octomap), xyz or txt (also .bz2), or KITTI bin, with the labels of SemanticKITTI
     /// from its .label file
     file: PathBuf,
-    /// cubic, bcc, fcc, mcc, hex, hexopt, several with commas, paper, or all
+    /// cubic, bcc, fcc, mcc, hex, hexopt, several separated by commas, paper, or all
     #[arg(long, default_value = "all")]
     lattice: Lattices,
     #[command(flatten)]
     cells: CellSize,
-    /// Orientation of the cells: paper, ground (flattest), or a crystal direction that points up, as 110-up
+    /// Orientation of the cells: paper, ground (flattest), or a crystal direction that points up, such as 110-up
     #[arg(long, default_value = "paper")]
     orientation: Orientation,
-    /// Most points to read
+    /// Limit of points
     #[arg(long, default_value_t = 500_000_000)]
     max_points: usize,
     #[command(flatten)]
     columns: Columns,
-    /// Most voxels to keep
+    /// Limit of voxels
     #[arg(long, default_value_t = 200_000_000)]
     max_voxels: usize,
-    /// Write the map of the first lattice here, for `lattice map`
+    /// File for the map of the first lattice, for `lattice map`
     #[arg(long, value_name = "FILE")]
     map_out: Option<PathBuf>,
     /// Print the numbers as JSON
@@ -50,7 +50,7 @@ struct Row {
     points: u64,
     refused_not_finite: u64,
     refused_out_of_range: u64,
-    /// Points at 0 0 0, left out.
+    /// Removed points at 0 0 0.
     no_returns: u64,
     voxels: usize,
     mse_per_dimension_m2: f64,
@@ -70,7 +70,7 @@ impl Quantize {
         for (i, kind) in self.lattice.0.iter().enumerate() {
             let lattice = Lattice::new(*kind, cell_volume_m3)?;
             let lattice = lattice.with_orientation(self.orientation)?;
-            // Only the map that is written keeps labels.
+            // Only the written map has labels.
             let keep_labels = i == 0 && self.map_out.is_some();
             let (list, report) = points.quantize(lattice, self.max_voxels, keep_labels)?;
             let distortion = list.distortion();
@@ -89,7 +89,7 @@ impl Quantize {
                 max_distance_m: distortion.max_distance_m,
             });
             if let (0, Some(path)) = (i, &self.map_out) {
-                whole::write(path, |out| write_map(&list, out))?;
+                atomic_write::write(path, |out| write_map(&list, out))?;
             }
         }
         if self.json {

@@ -1,4 +1,4 @@
-//! `lattice record`: what is on the topics as a rosbag2 log, with the options of `ros2 bag record`.
+//! `lattice record`: records topics as a rosbag2 log, with the options of `ros2 bag record`.
 
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -11,14 +11,14 @@ use regex::Regex;
 
 use crate::{CliResult, calendar};
 
-/// Kind of the files.
+/// Storage format.
 #[derive(Clone, Copy, ValueEnum)]
 enum StorageName {
     Mcap,
     Sqlite3,
 }
 
-/// Part that is compressed.
+/// Unit of compression.
 #[derive(Clone, Copy, ValueEnum)]
 enum CompressionMode {
     None,
@@ -26,7 +26,7 @@ enum CompressionMode {
     Message,
 }
 
-/// Format of compression.
+/// Compression format.
 #[derive(Clone, Copy, ValueEnum)]
 enum CompressionFormat {
     Zstd,
@@ -40,63 +40,63 @@ pub struct Record {
     /// Record all topics
     #[arg(long, short)]
     all: bool,
-    /// Record topics whose names are like this
+    /// Record topics whose names match
     #[arg(long, short = 'e')]
     regex: Option<Regex>,
-    /// Leave out topics whose names are like this
+    /// Exclude topics whose names match
     #[arg(long, short = 'x', alias = "exclude")]
     exclude_regex: Option<Regex>,
-    /// Leave out these topics
+    /// Exclude these topics
     #[arg(long, num_args = 1.., value_name = "TOPIC")]
     exclude_topics: Vec<String>,
     /// Record hidden topics too: those with a part that begins with `_`
     #[arg(long)]
     include_hidden_topics: bool,
-    /// Folder of the log, which must not be there yet; by default rosbag2_ and the time (UTC)
+    /// Folder of the log, which must not exist; by default rosbag2_ and the time (UTC)
     #[arg(long, short)]
     output: Option<PathBuf>,
-    /// Kind of its files
+    /// Storage format
     #[arg(long, short, value_enum, default_value = "mcap")]
     storage: StorageName,
-    /// Begin a new file when one holds so many bytes of messages; 0: never
+    /// Message bytes after which a new file begins; 0: never
     #[arg(long, short = 'b', default_value_t = 0, value_name = "BYTES")]
     max_bag_size: u64,
-    /// Begin a new file when one spans so many seconds; 0: never
+    /// Duration in seconds after which a new file begins; 0: never
     #[arg(long, short = 'd', default_value_t = 0, value_name = "S")]
     max_bag_duration: u32,
-    /// Part that is compressed
+    /// Unit of compression
     #[arg(long, value_enum, default_value = "none")]
     compression_mode: CompressionMode,
-    /// Format of the compression
+    /// Compression format
     #[arg(long, value_enum, default_value = "zstd")]
     compression_format: CompressionFormat,
-    /// Most bytes of messages that wait to be written; more are lost, and counted
+    /// Limit of message bytes that wait to be written; excess messages are lost, and counted
     #[arg(long, default_value_t = 100 << 20, value_name = "BYTES")]
     max_cache_size: usize,
-    /// End after so many seconds
+    /// Duration of the recording, s
     #[arg(long, value_name = "S")]
     duration: Option<f64>,
-    /// Record only topics that are there at the begin
+    /// Record only topics present at the start
     #[arg(long)]
     no_discovery: bool,
-    /// Time between two looks for topics, ms
+    /// Period of topic discovery, ms
     #[arg(long, short, default_value_t = 100, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..))]
     polling_interval: u32,
-    /// Note the times of /clock; nothing is recorded before its first message,
-    /// latched messages are with it
+    /// Stamp messages with /clock; only latched messages are recorded before its first message,
+    /// with its stamp
     #[arg(long)]
     use_sim_time: bool,
-    /// Begin with nothing until a call of ~/resume
+    /// Record nothing until a call of ~/resume
     #[arg(long)]
     start_paused: bool,
-    /// Folder with a folder for each package of messages, such as /opt/ros/jazzy/share; those of
-    /// AMENT_PREFIX_PATH are known
+    /// Folder with a subfolder per message package, such as /opt/ros/jazzy/share; those of
+    /// AMENT_PREFIX_PATH are always searched
     #[arg(long, value_name = "DIR")]
     msg_path: Vec<PathBuf>,
     /// Name of the node
     #[arg(long, value_name = "NAME")]
     node_name: Option<String>,
-    /// Print what was recorded as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
     /// As for any ROS node: `-- --ros-args -r from:=to -p name:=value ...`
@@ -108,7 +108,7 @@ impl Record {
     /// Runs the command.
     pub fn run(self) -> CliResult {
         if self.topics.is_empty() && !self.all && self.regex.is_none() {
-            return Err("which topics? Name them, or give --all or --regex".into());
+            return Err("no topics are given: name them, or give --all or --regex".into());
         }
         let mut args = self.ros_args.clone();
         args.push("--ros-args".to_owned());
@@ -186,7 +186,7 @@ fn print(bag: &str, report: &RecorderReport) {
     println!("{messages} messages, {megabytes:.1} MB, {seconds:.1} s in {bag}");
 }
 
-/// `rosbag2_2026_05_31-08_07_09`, in UTC; with `_1` and so on if another began in that second.
+/// `rosbag2_2026_05_31-08_07_09`, in UTC; with `_1` and so on if the name exists.
 fn default_folder() -> PathBuf {
     let now = SystemTime::now().duration_since(UNIX_EPOCH);
     let folder = folder_of(now.unwrap_or_default().as_secs());

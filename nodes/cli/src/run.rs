@@ -17,22 +17,22 @@ const PROCESS: &str = "lattice";
 /// Run several nodes in one process
 #[derive(Args)]
 pub struct Run {
-    /// Parameter files; the nodes that they name are run
+    /// Parameter files; the nodes named in them are run
     #[arg(required = true)]
     params: Vec<PathBuf>,
-    /// Nodes to run, when the files name others too
+    /// Nodes to run, of those named in the files
     #[arg(long, value_name = "NODE")]
     only: Vec<String>,
     /// As for any ROS node: `--ros-args -r from:=to -p name:=value ...`
     #[arg(last = true)]
     ros_args: Vec<String>,
-    /// Nodes that run whatever the files name.
+    /// Nodes that always run.
     #[arg(skip)]
     always: &'static [&'static str],
 }
 
 impl Run {
-    /// Runs the nodes that parameter files name, and some others.
+    /// Nodes named in parameter files, and those that always run.
     #[cfg(feature = "viewer")]
     pub fn nodes_of(
         params: Vec<PathBuf>,
@@ -81,7 +81,7 @@ impl Run {
             let known = known().collect::<Vec<_>>().join(", ");
             return Err(format!("the parameter files name none of the nodes {known}").into());
         }
-        // The node of the process itself has only the parameters of every node.
+        // The node of the process itself has common parameters only.
         let checked = nodes
             .iter()
             .map(|(name, _)| (*name, executables::reader_of(name)));

@@ -1,32 +1,32 @@
 //! Standard output and standard error of the commands.
 //!
-//! A reader that closes its end of the pipe, as `head` does, has what it wants: what is written after that
-//! is dropped, and the command ends as it would have. Any other error of standard output fails the command.
+//! A closed pipe, as from `head`, is not an error: further output
+//! is dropped, and the command ends normally. Any other error of standard output fails the command.
 
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
 use std::sync::{Mutex, PoisonError};
 
-/// The first error of standard output; nothing is written after it.
+/// First error of standard output; nothing is written after it.
 static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
 
-/// `print!` of the commands.
+/// `print!` for commands.
 macro_rules! print {
     ($($text:tt)*) => { $crate::streams::out(format_args!($($text)*)) };
 }
 
-/// `println!` of the commands.
+/// `println!` for commands.
 macro_rules! println {
     () => { $crate::streams::out(format_args!("\n")) };
     ($($text:tt)*) => { $crate::streams::out(format_args!("{}\n", format_args!($($text)*))) };
 }
 
-/// `eprintln!` of the commands.
+/// `eprintln!` for commands.
 macro_rules! eprintln {
     ($($text:tt)*) => { $crate::streams::err(format_args!("{}\n", format_args!($($text)*))) };
 }
 
-/// Writes to standard output; [`finish`] has the error, if there is one.
+/// Writes to standard output; [`finish`] returns its error, if any.
 pub fn out(text: Arguments) {
     let mut failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner);
     if failed.is_none() {
@@ -34,12 +34,12 @@ pub fn out(text: Arguments) {
     }
 }
 
-/// Writes to standard error, whose errors nobody could read.
+/// Writes to standard error, ignoring its errors.
 pub fn err(text: Arguments) {
     let _ = io::stderr().write_fmt(text);
 }
 
-/// Writes what is left; fails if standard output took less than all, unless its reader closed it.
+/// Flushes standard output; fails if output was lost, unless its reader closed it.
 pub fn finish() -> Result<(), String> {
     let mut failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner);
     let error = failed.take().or_else(|| io::stdout().flush().err());

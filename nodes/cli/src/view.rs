@@ -16,19 +16,19 @@ use crate::cell_size::CellSize;
 use crate::points::{Columns, Points};
 use crate::run::Run;
 
-/// Show a map in the browser: of a map file, a point file or a log, or live
+/// Show a map in the browser: a map file, a point file, a log, or a live map
 #[derive(Args)]
 pub struct View {
     /// A map file; a point file (ply, pcd, las, laz, e57, bt, xyz, txt, csv or KITTI bin, also .bz2), which is quantized
-    /// first, in cells for its extent and number of points unless a size is given; a rosbag2 log, which is mapped
-    /// first; parameter files, whose nodes are run with the viewer. Nothing: the map of the nodes that run on this ROS
+    /// first, with an automatic cell size unless one is given; a rosbag2 log, which is mapped
+    /// first; or parameter files, whose nodes are run with the viewer. By default the live map on this ROS
     /// domain
     what: Vec<PathBuf>,
     #[command(flatten)]
     cells: CellSize,
     #[command(flatten)]
     columns: Columns,
-    /// Address to listen on; any but this machine's own makes a token
+    /// Address to listen on; any but loopback requires a token
     #[arg(long, default_value = "127.0.0.1")]
     address: IpAddr,
     /// Port to listen on
@@ -78,7 +78,7 @@ impl View {
     }
 }
 
-/// Kind of what is shown.
+/// Kind of input.
 #[derive(PartialEq)]
 enum Kind {
     Map,
@@ -87,12 +87,12 @@ enum Kind {
     Params,
 }
 
-/// Most points of a file.
+/// Limit of points per file.
 const MAX_POINTS: usize = 500_000_000;
 
 const PARAMS: &str = "parameter files (.yaml, .yml)";
 
-/// The kind that a name tells; what else it is, is taken for a map.
+/// Input kind by name; anything else is assumed to be a map.
 fn kind(path: &Path) -> Kind {
     let ending = path.extension().and_then(|ending| ending.to_str());
     match ending.map(str::to_ascii_lowercase).as_deref() {
@@ -104,7 +104,7 @@ fn kind(path: &Path) -> Kind {
     }
 }
 
-/// True for a map, whatever its name.
+/// True for a map file with any name.
 fn is_map(path: &Path) -> bool {
     std::fs::File::open(path).is_ok_and(lattice_core::voxels::file::is_map)
 }
@@ -133,18 +133,18 @@ fn show(path: &Path, cells: &CellSize, columns: Columns, address: SocketAddr) ->
             &mapped
         }
         _ => {
-            cells.expect_none("the cells of a map file are as they are")?;
+            cells.expect_none("the cells of a map file are fixed")?;
             path
         }
     };
     let (_server, url) = serve_file(path, address)?;
-    // The map is in memory; only a signal ends this process.
+    // The map is in memory, so its folder is removed now; the process ends by a signal.
     #[cfg(feature = "bags")]
     drop(folder);
     stay(&url)
 }
 
-/// The map of a point file on the FCC lattice, with a line that says which cells it has.
+/// Map of a point file on the FCC lattice; prints its cell size.
 fn quantized(path: &Path, cells: &CellSize, options: &PointFileOptions) -> CliResult<VoxelList> {
     crate::init_logging();
     let points = Points::read(path, options)?;
@@ -166,7 +166,7 @@ fn quantized(path: &Path, cells: &CellSize, options: &PointFileOptions) -> CliRe
     );
     let refused = points.not_finite + report.not_finite + report.out_of_range;
     if refused > 0 {
-        println!("{refused} points are not finite or too far away, and left out");
+        println!("{refused} points are not finite or out of range, and are skipped");
     }
     Ok(list)
 }
@@ -179,7 +179,7 @@ fn stay(url: &str) -> CliResult {
     }
 }
 
-/// Serves a map file; gives the server and the address to open.
+/// Serves a map file; returns the server and its URL.
 pub fn serve_file(path: &Path, address: SocketAddr) -> CliResult<(viewer_server::Server, String)> {
     let (map, names) = crate::map::read_named(path).map_err(|error| {
         let points = "a point file (.ply, .pcd, .las, .laz, .e57, .bt, .xyz, .txt, .csv, .bin)";

@@ -1,7 +1,7 @@
 //! Networks that come with the laboratory.
 
 use crate::AnyError;
-use lattice_nodes::files::whole;
+use lattice_nodes::files::atomic_write;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ pub const ROOMS_ONNX: &[u8] = include_bytes!("../models/rooms.onnx");
 /// Writes [`ROOMS_ONNX`] to `rooms.onnx` in a folder, for nodes to read, and gives its path.
 pub fn write_rooms(folder: &Path) -> Result<PathBuf, AnyError> {
     let path = folder.join("rooms.onnx");
-    whole::write(&path, |file| file.write_all(ROOMS_ONNX))?;
+    atomic_write::write(&path, |file| file.write_all(ROOMS_ONNX))?;
     Ok(path)
 }
 

@@ -1,4 +1,4 @@
-//! Compiles the files of Cyclone DDS in `sources.sha256`, with the changes below, and the files in `c/`.
+//! Compiles the files of Cyclone DDS listed in `sources.sha256`, with the patches below, and the files in `c/`.
 
 use std::env;
 use std::error::Error;
@@ -7,17 +7,17 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-/// Digests of the files that are compiled or included, in the form of `sha256sum`.
+/// Digests of the compiled and included files, in the format of `sha256sum`.
 const SOURCES: &str = include_str!("sources.sha256");
 
-/// A change of a copy of one file: pieces of it, each of which stands there once, and what takes their place.
+/// Patch of one file: unique pieces of its text, and their replacements.
 struct Change {
     file: &'static str,
     pieces: &'static [(&'static str, &'static str)],
 }
 
 const CHANGES: [Change; 8] = [
-    // A reply names its request in the inline QoS, which is where clients over Fast DDS look for it.
+    // Adds the request identity to the inline QoS of a reply, where Fast DDS clients expect it.
     Change {
         file: "core/ddsi/src/ddsi_transmit.c",
         pieces: &[
@@ -29,15 +29,15 @@ const CHANGES: [Change; 8] = [
                 "    rc = ddsi_xmsg_addpar_sentinel_ifparam (*pmsg);",
                 "    lattice_blob_add_inline_qos (*pmsg, serdata);\n    rc = ddsi_xmsg_addpar_sentinel_ifparam (*pmsg);",
             ),
-            // Of a sample in fragments, Fast DDS takes it from the fragment that comes first, which is another one where
-            // the first is lost: the client would then drop a reply that it has acknowledged.
+            // Fast DDS reads the inline QoS from the first received fragment. If the first fragment is lost, another one must
+            // have it: the client would otherwise drop a reply that it has acknowledged.
             (
                 "  ddsi_xmsg_serdata (*pmsg, serdata, fragstart, fraglen, wr);\n",
                 "  if (fragnum > 0)\n  {\n    lattice_blob_add_inline_qos (*pmsg, serdata);\n    if (ddsi_xmsg_addpar_sentinel_ifparam (*pmsg) > 0)\n    {\n      ddcmn = ddsi_xmsg_submsg_from_marker (*pmsg, sm_marker);\n      ddcmn->smhdr.flags |= DDSI_DATAFRAG_FLAG_INLINE_QOS;\n    }\n  }\n  ddsi_xmsg_serdata (*pmsg, serdata, fragstart, fraglen, wr);\n",
             ),
         ],
     },
-    // A request that overtakes discovery is no history, whatever the vendor of its writer.
+    // A request received before discovery is complete is not history, for any vendor of its writer.
     Change {
         file: "core/ddsi/src/ddsi_endpoint_match.c",
         pieces: &[(
@@ -45,8 +45,8 @@ const CHANGES: [Change; 8] = [
             "    else if (ddsi_vendor_is_eclipse (pwr->c.vendor) || lattice_is_of_service (pwr->c.xqos))\n",
         )],
     },
-    // Fast DDS answers a reader that asks where its writer stands at once only if it asks for number 0, and each question
-    // only once, by its count. Where one or its answer is lost, it is asked again after 0.1 s, not after 1 s.
+    // Fast DDS replies at once to an ACKNACK only if it requests number 0, and only once per count.
+    // A lost request or reply is repeated after 0.1 s instead of 1 s.
     Change {
         file: "core/ddsi/src/ddsi_acknack.c",
         pieces: &[
@@ -64,7 +64,7 @@ const CHANGES: [Change; 8] = [
             ),
         ],
     },
-    // Forged participants are no end of memory.
+    // Bounds the memory for forged participants.
     Change {
         file: "core/ddsi/src/ddsi_discovery_spdp.c",
         pieces: &[(
@@ -72,7 +72,7 @@ const CHANGES: [Change; 8] = [
             "  if (!lattice_make_room (gv, timestamp.v))\n    return HSR_NOT_INTERESTING;\n\n  const bool is_secure = ((datap->builtin_endpoint_set & ",
         )],
     },
-    // What a reader that goes has not acknowledged is counted.
+    // Counts the samples left unacknowledged by a reader that leaves.
     Change {
         file: "core/ddsi/src/ddsi_proxy_endpoint.c",
         pieces: &[(
@@ -80,7 +80,7 @@ const CHANGES: [Change; 8] = [
             "        lattice_reader_left (wr, m_wr->seq);\n        m_wr->seq = DDSI_MAX_SEQ_NUMBER;\n        ddsrt_avl_augment_update",
         )],
     },
-    // Samples are taken as they come, and those that give way to newer ones are counted there: here none does.
+    // The runtime takes samples on arrival and counts overwritten ones; Cyclone must not overwrite any.
     Change {
         file: "core/ddsc/src/dds_rhc_default.c",
         pieces: &[(
@@ -88,7 +88,7 @@ const CHANGES: [Change; 8] = [
             "  rhc->history_depth = (qos->history.kind == DDS_HISTORY_KEEP_LAST && !lattice_is_blob_type (rhc->type)) ?",
         )],
     },
-    // A player keeps what is not acknowledged, within bytes, whatever depth was recorded.
+    // A player keeps unacknowledged samples up to a byte limit, regardless of the recorded depth.
     Change {
         file: "core/ddsc/src/dds_whc.c",
         pieces: &[(
@@ -96,7 +96,7 @@ const CHANGES: [Change; 8] = [
             "  wrinfo->hdepth = (qos->history.kind == DDS_HISTORY_KEEP_ALL || lattice_keeps_unacknowledged ()) ?",
         )],
     },
-    // Freed before its last use: mended in 11.0.1 in the same way.
+    // Use after free, fixed in 11.0.1 in the same way.
     Change {
         file: "core/ddsi/src/ddsi_wraddrset.c",
         pieces: &[
@@ -112,7 +112,7 @@ const CHANGES: [Change; 8] = [
     },
 ];
 
-/// Folders of headers, and those that security adds.
+/// Include folders, and those for DDS Security.
 const INCLUDES: [&str; 9] = [
     "core/cdr/include",
     "core/ddsi/include",
@@ -132,7 +132,7 @@ const SECURITY_INCLUDES: [&str; 5] = [
     "security/builtin_plugins/cryptographic/src",
 ];
 
-/// The plugins of security, which are linked in, and the functions that are looked up in them by name.
+/// Statically linked security plugins, and the functions looked up in them by name.
 const PLUGINS: [(&str, &str); 4] = [
     (
         "PLUGINS",
@@ -160,7 +160,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let os = env::var("CARGO_CFG_TARGET_OS")?;
     let security = env::var_os("CARGO_FEATURE_SECURITY").is_some();
     let mut build = cc::Build::new();
-    // Whatever the profile: unoptimised it is too slow for a sensor, and nobody debugs it here.
+    // In every profile: unoptimised code is too slow for a sensor.
     build
         .opt_level(2)
         .debug(false)
@@ -206,7 +206,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The bytes of a file; fails unless they are those that its digest is of.
+/// Reads a file and verifies its digest.
 fn checked(path: &Path, digest: &str) -> Result<Vec<u8>, Box<dyn Error>> {
     let text = fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
     let found: String = Sha256::digest(&text)
@@ -223,7 +223,7 @@ fn checked(path: &Path, digest: &str) -> Result<Vec<u8>, Box<dyn Error>> {
     }
 }
 
-/// True for a file that belongs to the parts that are built.
+/// True for a file of the built parts.
 fn is_wanted(file: &str, os: &str, security: bool) -> bool {
     let of_security =
         file.starts_with("security/") || file.starts_with("core/ddsi/src/ddsi_security_");
@@ -235,7 +235,7 @@ fn is_wanted(file: &str, os: &str, security: bool) -> bool {
     }
 }
 
-/// The path of a changed copy.
+/// Writes a patched copy and returns its path.
 fn changed(change: &Change, text: Vec<u8>) -> Result<PathBuf, Box<dyn Error>> {
     let mut text = format!("#include \"blob.h\"\n{}", String::from_utf8(text)?);
     for (from, to) in change.pieces {

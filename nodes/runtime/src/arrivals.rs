@@ -1,4 +1,4 @@
-//! Samples of a reader that wait for its task: the last of them, as its history says.
+//! Received samples that wait for the task of a reader, bounded by the history depth.
 
 use std::collections::VecDeque;
 use std::iter;
@@ -11,8 +11,8 @@ use futures::task::AtomicWaker;
 use super::port::ReaderLosses;
 use super::sync::lock;
 
-/// Samples that were taken out of the transport as they came. Its own history would overwrite what nobody
-/// takes without a word; here it is counted.
+/// Samples taken out of the transport on arrival. The transport overwrites its own history without a
+/// report; here overwritten samples are counted.
 pub(crate) struct Arrivals<T> {
     depth: usize,
     waiting: Mutex<VecDeque<T>>,
@@ -21,7 +21,7 @@ pub(crate) struct Arrivals<T> {
 }
 
 impl<T> Arrivals<T> {
-    /// For a history of the last `depth` samples.
+    /// A queue for a history of `depth` samples.
     pub(crate) fn new(depth: usize) -> Self {
         Self {
             depth: depth.max(1),
@@ -31,7 +31,7 @@ impl<T> Arrivals<T> {
         }
     }
 
-    /// Takes what `next` gives until it gives no more, and wakes the task that waits for it.
+    /// Takes samples from `next` until it returns `None`, and wakes the waiting task.
     pub(crate) fn take_from(&self, next: impl FnMut() -> Option<T>) {
         let mut waiting = lock(&self.waiting);
         for sample in iter::from_fn(next) {
@@ -45,23 +45,23 @@ impl<T> Arrivals<T> {
         self.waker.wake();
     }
 
-    /// The oldest sample that waits.
+    /// Takes the oldest waiting sample.
     fn pop(&self) -> Option<T> {
         lock(&self.waiting).pop_front()
     }
 
-    /// Samples that will not come out of here.
+    /// Counters of lost samples.
     pub(crate) fn losses(&self) -> &ReaderLosses {
         &self.losses
     }
 
-    /// The oldest sample that waits, or the task is woken when the next comes.
+    /// Takes the oldest waiting sample, or registers the task for the next one.
     pub(crate) fn poll_next(&self, context: &mut Context<'_>) -> Poll<T> {
         if let Some(sample) = self.pop() {
             return Poll::Ready(sample);
         }
         self.waker.register(context.waker());
-        // Something may have arrived before the waker was in place.
+        // A sample may have arrived before the waker was registered.
         self.pop().map_or(Poll::Pending, Poll::Ready)
     }
 }

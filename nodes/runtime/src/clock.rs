@@ -1,10 +1,10 @@
-//! The time nodes go by: that of the system, or the one on `/clock`.
+//! Time source of nodes: the system clock or `/clock`.
 
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering::Relaxed};
 use std::sync::{Arc, OnceLock};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Time of the system, or simulated time. Clones show the same, and change together.
+/// System time or simulated time. Clones share one source.
 #[derive(Clone, Debug, Default)]
 pub struct Clock {
     inner: Arc<Inner>,
@@ -13,28 +13,28 @@ pub struct Clock {
 #[derive(Debug, Default)]
 struct Inner {
     is_simulated: AtomicBool,
-    /// Set when it first goes by simulated time.
+    /// Set at the first switch to simulated time.
     sim_ns: OnceLock<Arc<AtomicI64>>,
 }
 
 impl Clock {
-    /// Goes by simulated time, which is set from elsewhere.
+    /// Switches to simulated time, which the owner of `sim_ns` sets.
     pub(crate) fn simulate(&self, sim_ns: Arc<AtomicI64>) {
         let _ = self.inner.sim_ns.set(sim_ns);
         self.inner.is_simulated.store(true, Relaxed);
     }
 
-    /// Goes by the system's time.
+    /// Switches to system time.
     pub(crate) fn follow_system(&self) {
         self.inner.is_simulated.store(false, Relaxed);
     }
 
-    /// True if it goes by simulated time.
+    /// True for simulated time.
     pub(crate) fn is_simulated(&self) -> bool {
         self.inner.is_simulated.load(Relaxed)
     }
 
-    /// Nanoseconds since the Unix epoch; with simulated time 0 until the first message on `/clock`.
+    /// Nanoseconds since the Unix epoch. Simulated time is 0 until the first message on `/clock`.
     pub fn now_ns(&self) -> i64 {
         match self.inner.sim_ns.get() {
             Some(sim_ns) if self.is_simulated() => sim_ns.load(Relaxed),

@@ -1,5 +1,5 @@
-//! Sockets of a transport kept on the loopback interface: Cyclone binds those that receive to all addresses,
-//! whatever its interfaces are.
+//! Restriction of a transport's sockets to the loopback interface. Cyclone binds receiving sockets to all
+//! addresses, regardless of its configured interfaces.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -10,7 +10,7 @@ use socket2::{SockRef, Type};
 
 const LOOPBACK: &[u8] = b"lo";
 
-/// Runs `make` and binds the datagram sockets that it opens to the loopback interface.
+/// Runs `make` and binds the datagram sockets opened by it to the loopback interface.
 pub(crate) fn to_loopback<T>(make: impl FnOnce() -> T) -> T {
     let before = open_files();
     let made = make();
@@ -29,7 +29,7 @@ pub(crate) fn to_loopback<T>(make: impl FnOnce() -> T) -> T {
     made
 }
 
-/// Open files of the process with what each is: numbers are used again.
+/// Open files of the process, number and target: numbers are reused.
 fn open_files() -> BTreeSet<(RawFd, PathBuf)> {
     let files = fs::read_dir("/proc/self/fd").into_iter().flatten();
     let files = files.filter_map(|file| {

@@ -1,4 +1,4 @@
-//! States of the nodes' tasks, on `/diagnostics` once a second.
+//! Diagnostic status of the nodes' tasks, published on `/diagnostics` at 1 Hz.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -10,27 +10,27 @@ use lattice_msgs::std_msgs::Header;
 
 use super::sync::lock;
 
-/// Tasks of all nodes of a process, at most.
+/// Limit of tasks of all nodes in a process.
 const MAX_TASKS: usize = 1000;
 
-/// Key of the value that is `false` while a node cannot do its work: with it a warning counts as an error in
-/// `lattice health`.
+/// Key of the value that is `false` while a node cannot do its work. `lattice health` treats a warning with it
+/// as an error.
 pub const WORKING: &str = "working";
 
-/// State of a task.
+/// Level of a diagnostic status.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// As it should be.
+    /// Normal operation.
     Ok,
-    /// Works, look at it.
+    /// Works, but needs attention.
     Warn,
     /// Does not work.
     Error,
-    /// Not heard of for too long.
+    /// No recent status.
     Stale,
 }
 
-/// States of one node's tasks.
+/// Diagnostic tasks of one node.
 #[derive(Clone)]
 pub struct Diagnostics {
     node: String,
@@ -38,10 +38,10 @@ pub struct Diagnostics {
     losses: Counts,
 }
 
-/// Counts by name, as they are now.
+/// Current counters by name.
 pub(crate) type Counts = Arc<dyn Fn() -> Vec<(String, u64)> + Send + Sync>;
 
-/// The tasks of all nodes of a process, by node and task.
+/// Tasks of all nodes of a process, by node and task.
 #[derive(Default)]
 pub(crate) struct Tasks {
     states: Mutex<BTreeMap<(String, String), DiagnosticStatus>>,
@@ -56,12 +56,12 @@ impl Diagnostics {
         }
     }
 
-    /// Messages and requests that this process has lost, by topic, as the task `transport` shows them.
+    /// Messages and requests lost in this process, by topic, as in the task `transport`.
     pub fn losses(&self) -> Vec<(String, u64)> {
         (self.losses)()
     }
 
-    /// States how `task` is, with figures; repeated once a second until stated anew.
+    /// Sets the status of `task` with its values. It is repeated at 1 Hz until set again.
     pub fn set<K: Display, V: Display>(
         &self,
         task: &str,
@@ -77,7 +77,7 @@ impl Diagnostics {
         }
     }
 
-    /// Calls all tasks of the node stale: it has ended, and its figures are of the past.
+    /// Marks all tasks of an ended node as stale.
     pub(crate) fn end(&self) {
         let mut states = lock(&self.tasks.states);
         for (_, status) in states.iter_mut().filter(|(key, _)| key.0 == self.node) {
@@ -87,7 +87,7 @@ impl Diagnostics {
     }
 }
 
-/// One state under the name that the tools expect, `node: task`.
+/// Status named `node: task`, as the ROS tools expect.
 pub(crate) fn status<K: Display, V: Display>(
     node: &str,
     task: &str,
@@ -114,7 +114,7 @@ pub(crate) fn status<K: Display, V: Display>(
 }
 
 impl Tasks {
-    /// All states, `extra` first.
+    /// Message of all statuses, `extra` first.
     pub(crate) fn message(&self, stamp_ns: i64, extra: DiagnosticStatus) -> DiagnosticArray {
         let states = lock(&self.states);
         DiagnosticArray {

@@ -1,4 +1,4 @@
-//! Endpoints of this process by identity: each hears of the peers it is matched with.
+//! Endpoints of this process by GUID, each with its matched peers.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
@@ -7,23 +7,23 @@ use std::sync::{Arc, Mutex, Weak};
 use futures::StreamExt;
 use futures::stream::BoxStream;
 
-use super::neighbours::Neighbours;
+use super::discovered_graph::DiscoveredGraph;
 use super::peers::Peers;
 use super::port::{EndpointId, PortEvent};
 use super::remote::{GraphRole, RemotePublisher};
 use super::sync::lock;
 
-/// Events of endpoints that are not registered yet, kept at most.
+/// Limit of stored events for endpoints that are not registered yet.
 const MAX_EARLY_EVENTS: usize = 1024;
 
-/// Publishers elsewhere that are remembered, at most.
+/// Limit of stored remote publishers.
 const MAX_REMOTES: usize = 8192;
 
-/// Peers of all endpoints of a process, and all publishers elsewhere.
+/// Peers of all local endpoints, and all remote publishers.
 #[derive(Default)]
 pub(crate) struct Endpoints {
     pub remotes: Remotes,
-    pub neighbours: Neighbours,
+    pub discovered_graph: DiscoveredGraph,
     inner: Mutex<Inner>,
 }
 
@@ -35,12 +35,12 @@ struct Inner {
 
 struct Change {
     peer: EndpointId,
-    /// The policy in which the peer does not go with ours; none: it matches.
+    /// Incompatible policy of the peer; `None`: it matches.
     incompatible: Option<Cow<'static, str>>,
 }
 
 impl Endpoints {
-    /// From now on `peers` hears of everything that happens to the endpoint, and of what did.
+    /// Passes all past and future events of the endpoint to `peers`.
     pub(crate) fn register(&self, endpoint: EndpointId, peers: &Arc<Peers>) {
         let mut inner = lock(&self.inner);
         inner.peers.retain(|_, peers| peers.strong_count() > 0);
@@ -55,7 +55,7 @@ impl Endpoints {
         }
     }
 
-    /// Hands events on until the task is dropped.
+    /// Dispatches events until the task is dropped.
     pub(crate) async fn watch(self: Arc<Self>, mut events: BoxStream<'static, PortEvent>) {
         while let Some(event) = events.next().await {
             self.hear(event);
@@ -76,7 +76,7 @@ impl Endpoints {
                 node,
             } => {
                 let (role, topic) = (GraphRole::Publisher, &publisher.topic);
-                self.neighbours.add(peer, role, topic, node);
+                self.discovered_graph.add(peer, role, topic, node);
                 return self.remotes.add(peer, *publisher);
             }
             PortEvent::FoundOther {
@@ -84,7 +84,7 @@ impl Endpoints {
                 role,
                 name,
                 node,
-            } => return self.neighbours.add(peer, role, &name, node),
+            } => return self.discovered_graph.add(peer, role, &name, node),
             PortEvent::Lost { peer: lost } => return self.lost(|peer| *peer == lost),
         };
         let change = Change { peer, incompatible };
@@ -105,7 +105,7 @@ impl Endpoints {
 
     fn lost(&self, gone: impl Fn(&EndpointId) -> bool) {
         self.remotes.remove(&gone);
-        self.neighbours.remove(&gone);
+        self.discovered_graph.remove(&gone);
         let mut inner = lock(&self.inner);
         inner.early.retain(|(_, change)| !gone(&change.peer));
         let all: Vec<Arc<Peers>> = inner.peers.values().filter_map(Weak::upgrade).collect();
@@ -123,12 +123,12 @@ fn apply(peers: &Peers, change: Change) {
     }
 }
 
-/// All publishers in other processes that are known.
+/// All known publishers of other processes.
 #[derive(Default)]
 pub(crate) struct Remotes(Mutex<BTreeMap<EndpointId, RemotePublisher>>);
 
 impl Remotes {
-    /// A publisher has been found, or tells of itself again.
+    /// Adds or updates a publisher.
     pub(crate) fn add(&self, id: EndpointId, publisher: RemotePublisher) {
         let mut all = lock(&self.0);
         if all.len() < MAX_REMOTES || all.contains_key(&id) {
@@ -136,12 +136,12 @@ impl Remotes {
         }
     }
 
-    /// Publishers have gone.
+    /// Removes publishers.
     pub(crate) fn remove(&self, gone: impl Fn(&EndpointId) -> bool) {
         lock(&self.0).retain(|id, _| !gone(id));
     }
 
-    /// Those that are there, in no order that means anything.
+    /// All known publishers, in arbitrary order.
     pub(crate) fn all(&self) -> Vec<RemotePublisher> {
         lock(&self.0).values().cloned().collect()
     }

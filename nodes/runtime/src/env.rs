@@ -1,4 +1,4 @@
-//! Network settings that ROS 2 reads from the environment.
+//! Network settings from the environment variables of ROS 2.
 
 use thiserror::Error;
 
@@ -6,7 +6,7 @@ use crate::security::Security;
 
 /// Highest DDS domain whose ports fit below 65536.
 const DOMAIN_ID_MAX: u16 = 232;
-/// Domains whose ports lie among those that Linux gives to outgoing connections.
+/// Domains whose ports overlap the ephemeral port range of Linux.
 const EPHEMERAL_DOMAINS: std::ops::RangeInclusive<u16> = 102..=214;
 
 const DOMAIN_ID: &str = "ROS_DOMAIN_ID";
@@ -18,7 +18,7 @@ pub(crate) const ZENOH_SESSION_CONFIG: &str = "ZENOH_SESSION_CONFIG_URI";
 pub(crate) const ZENOH_OVERRIDE: &str = "ZENOH_CONFIG_OVERRIDE";
 pub(crate) const ZENOH_CHECK_ATTEMPTS: &str = "ZENOH_ROUTER_CHECK_ATTEMPTS";
 
-/// The transport under the nodes.
+/// Transport of the nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TransportKind {
     /// DDS, by Eclipse Cyclone DDS.
@@ -28,18 +28,18 @@ pub enum TransportKind {
     Zenoh,
 }
 
-/// Name of the transport over Zenoh, built in or not.
+/// Name of the Zenoh transport, even where it is not built in.
 const ZENOH: &str = "rmw_zenoh_cpp";
 
 impl TransportKind {
-    /// The transports built in, by their names in `RMW_IMPLEMENTATION`; the first is the default.
+    /// Transports built in, by their `RMW_IMPLEMENTATION` names; the first is the default.
     pub const BUILT_IN: &[(&str, TransportKind)] = &[
         ("rmw_cyclonedds_cpp", TransportKind::Dds),
         #[cfg(feature = "zenoh")]
         (ZENOH, TransportKind::Zenoh),
     ];
 
-    /// Names of other implementations of DDS, which understand ours.
+    /// Names of other DDS implementations, which interoperate with ours.
     const OTHER_DDS: [&str; 3] = [
         "rmw_fastrtps_cpp",
         "rmw_fastrtps_dynamic_cpp",
@@ -58,25 +58,25 @@ impl TransportKind {
 pub struct Network {
     /// DDS domain, 0 to 232.
     pub domain_id: u16,
-    /// True where nothing may leave this machine.
+    /// True: communication is restricted to this machine.
     pub localhost_only: bool,
-    /// True where no other process is to be found, and none finds this one.
+    /// True: discovery is off in both directions.
     pub discovery_off: bool,
-    /// Addresses of machines where participants are looked for besides multicast.
+    /// Addresses of hosts to discover in addition to multicast.
     pub static_peers: Vec<String>,
-    /// The transport to use.
+    /// Selected transport.
     pub transport: TransportKind,
-    /// DDS Security, where it is switched on.
+    /// DDS Security, if enabled.
     pub security: Option<Security>,
     /// Settings of the session on Zenoh.
     pub zenoh: ZenohSettings,
-    /// Lines for the log.
+    /// Warnings for the log.
     pub warnings: Vec<String>,
-    /// The same, of level INFO.
+    /// Notes for the log, level INFO.
     pub notes: Vec<String>,
 }
 
-/// Variables of rmw_zenoh, as they are given.
+/// Variables of rmw_zenoh, unparsed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ZenohSettings {
     /// `ZENOH_SESSION_CONFIG_URI`: a file of Zenoh.
@@ -87,22 +87,22 @@ pub struct ZenohSettings {
     pub router_check: Option<String>,
 }
 
-/// A variable has a value that nothing can be made of.
+/// Invalid environment variable.
 #[derive(Debug, Error)]
 pub enum EnvError {
-    /// `ROS_DOMAIN_ID` holds this text, which is no DDS domain.
-    #[error("ROS_DOMAIN_ID={0:?} is no DDS domain; expected a number from 0 to 232")]
+    /// Invalid `ROS_DOMAIN_ID`.
+    #[error("ROS_DOMAIN_ID={0:?} is outside 0..=232; set a DDS domain in this range or unset it")]
     Domain(String),
     /// `RMW_IMPLEMENTATION` names a transport that is not built in.
     #[error(
         "RMW_IMPLEMENTATION={given:?} is not built in; possible are {possible}, or leave it unset{remedy}"
     )]
     Transport {
-        /// The name given.
+        /// Value of the variable.
         given: String,
-        /// Names of those built in.
+        /// Names of the transports built in.
         possible: String,
-        /// Words on how to build it, where that is known.
+        /// Build instruction, if known.
         remedy: &'static str,
     },
 }
@@ -142,7 +142,7 @@ impl Network {
         };
         if EPHEMERAL_DOMAINS.contains(&domain_id) {
             warnings.push(format!(
-                "{DOMAIN_ID}={domain_id} uses ports that Linux gives to outgoing connections; \
+                "{DOMAIN_ID}={domain_id} uses ports in the ephemeral range of Linux; \
                  0 to 101 and 215 to 232 are safe"
             ));
         }
@@ -195,7 +195,7 @@ fn transport(name: Option<String>, notes: &mut Vec<String>) -> Result<TransportK
     };
     if TransportKind::OTHER_DDS.contains(&&*name) {
         notes.push(format!(
-            "{IMPLEMENTATION}={name}: DDS is spoken by Eclipse Cyclone DDS, which is built in"
+            "{IMPLEMENTATION}={name}: using Eclipse Cyclone DDS, the built-in DDS"
         ));
         return Ok(TransportKind::Dds);
     }
@@ -217,12 +217,12 @@ fn static_peers(value: Option<String>, warnings: &mut Vec<String>) -> Vec<String
     };
     let (good, bad): (Vec<_>, Vec<_>) = addresses.partition(is_address);
     if !bad.is_empty() {
-        warnings.push(format!("{STATIC_PEERS}: {bad:?} are no addresses"));
+        warnings.push(format!("{STATIC_PEERS}: invalid addresses {bad:?}"));
     }
     good.into_iter().map(str::to_owned).collect()
 }
 
-/// True for a discovery range that stays on this machine.
+/// True for a discovery range limited to this machine.
 fn is_local(range: &str, warnings: &mut Vec<String>) -> bool {
     match range {
         "OFF" | "LOCALHOST" => true,

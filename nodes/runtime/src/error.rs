@@ -10,33 +10,33 @@ use super::security::SecurityError;
 /// Reason why a runtime, a node or an endpoint cannot be made.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
-    /// No DDS participant.
+    /// The DDS participant could not be created.
     #[error(
         "cannot join DDS domain {domain}: {reason}; check ROS_DOMAIN_ID (0..=232) and the network interfaces"
     )]
     Participant {
         /// The domain.
         domain: u16,
-        /// In the words of the transport.
+        /// Error of the transport.
         reason: String,
     },
-    /// No Zenoh session.
+    /// The Zenoh session could not be opened.
     #[error("cannot open the Zenoh session: {reason}")]
     Session {
-        /// In words.
+        /// Error of the transport.
         reason: String,
     },
-    /// No endpoint.
+    /// The endpoint could not be created.
     #[error("{topic}: cannot create the {endpoint}: {reason}")]
     Endpoint {
         /// Resolved topic or service.
         topic: String,
         /// `publisher`, `subscription` or `service`.
         endpoint: &'static str,
-        /// In the words of the transport.
+        /// Error of the transport.
         reason: String,
     },
-    /// Not the name of a ROS type.
+    /// Invalid type name.
     #[error("{topic}: {type_name:?} is not a type name like sensor_msgs/msg/PointCloud2")]
     TypeName {
         /// Resolved topic.
@@ -44,34 +44,34 @@ pub enum RuntimeError {
         /// The name given.
         type_name: String,
     },
-    /// Two types on one topic.
+    /// Conflicting types on one topic.
     #[error(
-        "{topic}: is used as {have} in this process and cannot be {want} too; remap one of them"
+        "{topic}: already used with type {have} in this process, not {want}; remap one of them"
     )]
     TypeMismatch {
         /// Resolved topic.
         topic: String,
         /// Type in use.
         have: String,
-        /// Type asked for.
+        /// Requested type.
         want: String,
     },
-    /// A name is not valid.
+    /// Invalid name.
     #[error(transparent)]
     Name(#[from] NameError),
-    /// A parameter is not valid.
+    /// Invalid parameter.
     #[error(transparent)]
     Param(#[from] ParamError),
-    /// The environment is not valid.
+    /// Invalid environment.
     #[error(transparent)]
     Env(#[from] EnvError),
-    /// Security is enforced and cannot be had, or refuses.
+    /// Security is enforced and unavailable, or denies access.
     #[error(transparent)]
     Security(#[from] SecurityError),
-    /// No thread.
+    /// A thread could not be started.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] std::io::Error),
-    /// A thread cannot go on.
+    /// A thread panicked.
     #[error("thread {thread} panicked; this is a bug, please report the message above")]
     Panicked {
         /// Its name.
@@ -88,7 +88,7 @@ pub enum RuntimeError {
 /// Reason why a message was not queued.
 #[derive(Debug, Error)]
 pub enum PublishError {
-    /// The queue holds as much as it may.
+    /// The queue is full.
     #[error("{topic}: the queue of the publisher is full, message dropped ({dropped} so far)")]
     QueueFull {
         /// Resolved topic.
@@ -103,13 +103,15 @@ pub enum PublishError {
         topic: String,
     },
     /// Not little-endian plain CDR.
-    #[error("{topic}: {bytes} bytes beginning with {header:02x?} are no little-endian CDR message")]
+    #[error(
+        "{topic}: {bytes} bytes beginning with {header:02x?} are not a little-endian plain CDR message"
+    )]
     NotLittleEndianCdr {
         /// Resolved topic.
         topic: String,
         /// Length of the message.
         bytes: usize,
-        /// Its first bytes, four at most.
+        /// Its first bytes, up to four.
         header: Vec<u8>,
     },
 }

@@ -1,18 +1,18 @@
-//! Samples that were lost on the way, by the numbers that their writers gave them.
+//! Lost samples, detected from gaps in the writers' sequence numbers.
 
 use std::collections::BTreeMap;
 
 use crate::port::EndpointId;
 
-/// Writers of a topic that are remembered; of more, the one not heard for longest is forgotten.
+/// Limit of tracked writers per topic; the least recently active one is removed.
 const MAX_WRITERS: usize = 4096;
 
-/// The numbers of each writer so far.
+/// Sequence numbers received from each writer.
 ///
-/// A writer numbers its samples without gaps. Those before its first one here were not meant for this reader, which came
-/// later; those left out after it were lost, or given up by a writer whose history has newer ones. A writer is
-/// known by its GUID: its numbers go on after a cut in which either side took the other for gone, and a writer that
-/// was started again has another GUID.
+/// A writer numbers its samples without gaps. Samples before the first received one preceded the match and are
+/// not counted. Missing samples after it were lost, or overwritten in the writer's history. A writer is
+/// identified by its GUID: its numbers continue after a lost lease, and a restarted writer has a new
+/// GUID.
 #[derive(Default)]
 pub(crate) struct Gaps {
     writers: BTreeMap<EndpointId, Seen>,
@@ -20,15 +20,15 @@ pub(crate) struct Gaps {
 }
 
 struct Seen {
-    /// Handle of the transport's, another one each time that it finds the writer.
+    /// Transport handle; it changes each time the transport rediscovers the writer.
     handle: u64,
     next: i64,
-    /// Samples of all writers before its last one.
+    /// Activity counter at its last sample.
     at: u64,
 }
 
 impl Gaps {
-    /// Notes a sample; gives those that are missing before it.
+    /// Records a sample; returns the number of samples missing before it.
     pub(crate) fn note(&mut self, writer: EndpointId, handle: u64, number: i64) -> u64 {
         self.samples += 1;
         let at = self.samples;
@@ -45,7 +45,7 @@ impl Gaps {
             seen.next = next;
             return missing.unsigned_abs();
         }
-        // Of a history that is had again, or of a writer that counts anew.
+        // Resent history, or a writer that restarted its numbering.
         if is_found_again {
             seen.next = next;
         }

@@ -1,7 +1,7 @@
-//! The nodes of this process and their endpoints, for `ros2 node list` and `ros2 node info`.
+//! Nodes and endpoints of this process, for `ros2 node list` and `ros2 node info`.
 //!
-//! ROS 2 nodes are no DDS entities: every participant says on `ros_discovery_info` which nodes it
-//! holds, with the readers and writers of each (rmw_dds_common).
+//! DDS has no node entity: each participant publishes its nodes with their readers and writers on
+//! `ros_discovery_info` (rmw_dds_common).
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, Weak};
@@ -13,20 +13,20 @@ use serde::ser::{Serialize, SerializeTuple, Serializer};
 use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
 
+use super::discovered_graph::GraphEndpoint;
 use super::names;
-use super::neighbours::GraphEndpoint;
 use super::outbox::Outbox;
 use super::port::{EndpointId, EndpointKind, PortNode, Transport};
 use super::remote::GraphRole;
 use super::sync::lock;
 
-/// Time between a change and the message that names it.
+/// Delay between a change and its message.
 const SETTLE_TIME: Duration = Duration::from_millis(50);
 
-/// Longest time that the end of the process waits for the readers of the last message.
+/// Longest wait at shutdown for readers of the last message.
 const LEAVE_TIME: Duration = Duration::from_millis(500);
 
-/// A node of this process, by its place in the graph.
+/// Index of a node in the graph.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NodeId(usize);
 
@@ -45,13 +45,13 @@ struct Entry {
     writers: Endpoints,
 }
 
-/// Role and full name of each that has one in the graph of nodes, by identity.
+/// Graph entry of each endpoint, by GUID.
 type Endpoints = BTreeMap<EndpointId, Option<InGraph>>;
 
-/// Role of an endpoint, and the full name of its topic or service.
+/// Role of an endpoint, and full name of its topic or service.
 pub(crate) type InGraph = (GraphRole, String);
 
-/// Text of a second node of the same name in a process; it begins as that of rcl.
+/// Warning for a second node of the same name in a process; begins as in rcl.
 fn same_name(namespace: &str, name: &str) -> String {
     let node = names::fully_qualified(name, namespace);
     let logger = node.trim_start_matches('/').replace('/', ".");
@@ -64,7 +64,7 @@ fn same_name(namespace: &str, name: &str) -> String {
     )
 }
 
-/// An endpoint in the graph; dropping it takes it out.
+/// Graph entry of an endpoint; dropping it removes the entry.
 pub(crate) struct NodeEndpoint {
     graph: Arc<Graph>,
     node: NodeId,
@@ -82,7 +82,7 @@ impl Graph {
         })
     }
 
-    /// Adds a node; it stays until the process ends.
+    /// Adds a node until the process ends.
     pub(crate) fn add_node(&self, namespace: &str, name: &str) -> NodeId {
         let mut nodes = lock(&self.nodes);
         let id = NodeId(nodes.len());
@@ -140,7 +140,7 @@ impl Graph {
         self.note_change();
     }
 
-    /// Endpoints of the nodes.
+    /// All endpoints of the nodes.
     pub(crate) fn all(&self) -> Vec<GraphEndpoint> {
         let mut all = Vec::new();
         for entry in lock(&self.nodes).iter() {
@@ -156,16 +156,16 @@ impl Graph {
         all
     }
 
-    /// Has the graph published again.
+    /// Requests publication of the graph.
     pub(crate) fn note_change(&self) {
-        // One note that something has changed is enough.
+        // One pending notification is enough.
         let _ = self.changed.try_send(());
     }
 
-    /// Publishes that the participant has no nodes any more, and waits for its readers. False: not
-    /// all have acknowledged in time. Not while [`Graph::publish`] runs.
+    /// Publishes an empty node list and waits for its readers. False: timeout before all have
+    /// acknowledged. Not while [`Graph::publish`] runs.
     ///
-    /// Fast DDS takes no note of the disposal of our participant: it would list the nodes until the lease ends.
+    /// Fast DDS ignores the disposal of our participant and would list its nodes until the lease expires.
     pub(crate) fn leave(&self, participant: EndpointId, writer: &Outbox) -> bool {
         lock(&self.nodes).clear();
         let message = self.message(participant, gid_bytes());
@@ -192,7 +192,7 @@ impl Graph {
     pub(crate) async fn publish(self: Arc<Self>, of: Weak<dyn Transport>, writer: Arc<Outbox>) {
         let gid_bytes = gid_bytes();
         while self.changes.recv().await.is_ok() {
-            // Endpoints come in bursts, and each message stays in the history for late joiners.
+            // Endpoints are created in bursts, and each message stays in the history for late joiners.
             Timer::after(SETTLE_TIME).await;
             let _ = self.changes.try_recv();
             let Some(of) = of.upgrade() else { return };
@@ -201,7 +201,7 @@ impl Graph {
             if let Err(error) = writer.send(Box::new(move || cdr::to_vec(&message))) {
                 log::debug!("{error}");
             }
-            // All changes while this goes out make one message.
+            // Changes during the transmission are merged into one message.
             writer.flushed().await;
         }
     }
@@ -214,12 +214,12 @@ impl Drop for NodeEndpoint {
     }
 }
 
-/// Bytes of a gid on the wire of the distribution that the environment names.
+/// GID length on the wire, by `ROS_DISTRO`.
 pub(crate) fn gid_bytes() -> usize {
     gid_bytes_of(std::env::var("ROS_DISTRO").ok().as_deref())
 }
 
-/// 24 up to Humble, 16 since Iron.
+/// GID length of a distribution: 24 up to Humble, 16 since Iron.
 fn gid_bytes_of(distro: Option<&str>) -> usize {
     match distro {
         Some("dashing" | "eloquent" | "foxy" | "galactic" | "humble") => 24,
@@ -227,7 +227,7 @@ fn gid_bytes_of(distro: Option<&str>) -> usize {
     }
 }
 
-/// Identity of an endpoint, padded to the length of the distribution.
+/// GUID of an endpoint, padded to the GID length of the distribution.
 struct Gid {
     bytes: [u8; 24],
     length: usize,

@@ -1,28 +1,28 @@
-//! A ROS 2 client library for nodes: arguments, names, parameters, topics, services, actions, time and
-//! log, over a transport behind one port.
+//! ROS 2 client library: arguments, names, parameters, topics, services, actions, time and logging, over
+//! an abstract transport.
 #![deny(unsafe_code)]
 
 mod action;
 mod arrivals;
 mod clock;
-#[expect(unsafe_code, reason = "sockets of others are borrowed")]
+#[expect(unsafe_code, reason = "borrows sockets of the transport")]
 mod confine;
-#[expect(unsafe_code, reason = "Cyclone DDS has an interface in C")]
+#[expect(unsafe_code, reason = "calls the C API of Cyclone DDS")]
 mod cyclone;
 mod diagnostics;
+mod discovered_graph;
 mod endpoints;
 pub mod env;
 mod error;
 mod gaps;
-mod gate;
 mod graph;
 pub mod lifecycle;
+mod lifecycle_gate;
 mod local_bus;
 mod logger_services;
 pub mod logging;
 mod loopback_domain;
 mod names;
-mod neighbours;
 mod node;
 mod outbox;
 mod param_services;
@@ -53,9 +53,9 @@ mod type_description;
 pub use action::{ActionLimits, ActionServer, Feedback, GoalHandle};
 pub use clock::Clock;
 pub use diagnostics::{Diagnostics, Level, WORKING};
+pub use discovered_graph::GraphEndpoint;
 pub use error::{PublishError, RuntimeError};
 pub use loopback_domain::LoopbackDomain;
-pub use neighbours::GraphEndpoint;
 pub use node::Node;
 pub use process::Runtime;
 pub use publisher::{Publisher, RawPublisher};
@@ -63,8 +63,8 @@ pub use remote::{GraphRole, RemotePublisher};
 pub use service::{Reply, Server};
 pub use shared::{CallError, Client};
 pub use shutdown::{Shutdown, catch_file_size_signal};
-pub use subscription::{Load, Losses, Subscription, Undecoded};
+pub use subscription::{Losses, Subscription, SubscriptionExecutor, Undecoded};
 pub use sync::lock;
-pub use task_thread::guarded;
+pub use task_thread::run_catching_panics;
 pub use tf::{StaticTfBroadcaster, TfBroadcaster};
 pub use timer::Timer;

@@ -1,6 +1,6 @@
-//! Messages between the nodes of one process: the same `Arc`, by topic name.
+//! Intra-process delivery: messages are shared as `Arc` by topic name.
 //!
-//! RustDDS does not deliver inside a participant, and a copy through sockets would be a waste.
+//! Cyclone's participant ignores its own endpoints, which saves a copy through sockets.
 
 use std::any::{Any, TypeId};
 use std::collections::{BTreeMap, VecDeque};
@@ -16,17 +16,17 @@ use super::peers::Peers;
 use super::port::Bytes;
 use super::sync::lock;
 
-/// A message of any type.
+/// Type-erased message.
 pub(crate) type AnyMessage = Arc<dyn Any + Send + Sync>;
 
-/// All topics of a runtime.
+/// Intra-process topics of a runtime.
 #[derive(Default)]
 pub(crate) struct LocalBus {
     topics: Mutex<BTreeMap<String, Arc<Topic>>>,
 }
 
 impl LocalBus {
-    /// The topic of a resolved name.
+    /// Topic of a resolved name.
     pub(crate) fn topic(&self, name: &str) -> Arc<Topic> {
         let mut topics = lock(&self.topics);
         let topic = topics.entry(name.to_owned()).or_insert_with(|| {
@@ -39,7 +39,7 @@ impl LocalBus {
     }
 }
 
-/// One topic inside the process.
+/// An intra-process topic.
 pub(crate) struct Topic {
     name: String,
     inner: Mutex<Inner>,
@@ -48,7 +48,7 @@ pub(crate) struct Topic {
 #[derive(Default)]
 struct Inner {
     next_id: u64,
-    /// Number of the last change of publishers or subscribers.
+    /// Counter of changes of publishers and subscribers.
     change: u64,
     type_name: Option<String>,
     rust_type: Option<(TypeId, Decode)>,
@@ -78,14 +78,14 @@ struct SubscriberEntry {
     lost: Arc<AtomicU64>,
 }
 
-/// A publisher or subscriber on a topic of the process; dropping it leaves the topic.
+/// Intra-process publisher or subscriber; dropping it leaves the topic.
 pub(crate) struct LocalEndpoint {
     topic: Arc<Topic>,
     id: u64,
 }
 
 impl Topic {
-    /// Joins as a publisher of `M` that keeps its last `latch_depth` messages for late joiners.
+    /// Adds a publisher of `M` that keeps its last `latch_depth` messages for late joiners.
     pub(crate) fn join_publisher<M: RosMessage>(
         self: &Arc<Self>,
         peers: &Arc<Peers>,
@@ -97,7 +97,7 @@ impl Topic {
         )
     }
 
-    /// Joins as a publisher of CDR bytes of the type.
+    /// Adds a publisher of CDR bytes of the type.
     pub(crate) fn join_raw_publisher(
         self: &Arc<Self>,
         type_name: &str,
@@ -110,8 +110,8 @@ impl Topic {
         )
     }
 
-    /// Joins as a subscriber; `latched`: hear what publishers have kept. `lost` counts messages that
-    /// gave way to newer ones in a full queue.
+    /// Adds a subscriber; `latched`: receives the kept messages of publishers. `lost` counts messages overwritten
+    /// by newer ones in a full queue.
     pub(crate) fn join_subscriber<M: RosMessage>(
         self: &Arc<Self>,
         peers: &Arc<Peers>,
@@ -124,7 +124,7 @@ impl Topic {
             |inner, id| {
                 if latched {
                     for message in inner.latched() {
-                        // A full queue has newer messages than this one.
+                        // A full queue contains newer messages than this one.
                         let _ = sender.force_send(message);
                     }
                 }
@@ -158,7 +158,7 @@ impl Topic {
     }
 }
 
-/// Endpoints of a topic as they were at one change.
+/// Endpoint counts of a topic after one change.
 struct Counts {
     change: u64,
     publishers: Vec<Arc<Peers>>,
@@ -166,7 +166,7 @@ struct Counts {
 }
 
 impl Counts {
-    /// Gives each side the number of the other; not under the lock, since it runs callbacks.
+    /// Passes each side the count of the other; called without the lock, since it runs callbacks.
     fn hand_on(&self) {
         for peers in &self.publishers {
             peers.set_local(self.subscribers.len(), self.change);
@@ -178,14 +178,14 @@ impl Counts {
 }
 
 impl LocalEndpoint {
-    /// Hands a message to all subscribers.
+    /// Delivers a message to all subscribers.
     pub(crate) fn publish(&self, message: &AnyMessage) {
         let mut inner = lock(&self.topic.inner);
         inner.latch(self.id, || Latched::Message(Arc::clone(message)));
         inner.deliver(message);
     }
 
-    /// Hands CDR bytes, header included, to all subscribers, decoded once.
+    /// Delivers CDR bytes, header included, to all subscribers, decoded once.
     pub(crate) fn publish_cdr(&self, cdr: &Bytes) -> Result<(), CdrError> {
         let mut inner = lock(&self.topic.inner);
         inner.latch(self.id, || Latched::Cdr(cdr.clone()));
@@ -283,7 +283,7 @@ impl Inner {
             Latched::Cdr(bytes) => {
                 let (_, decode) = self.rust_type?;
                 decode(bytes)
-                    .inspect_err(|error| log::warn!("latched message not readable: {error}"))
+                    .inspect_err(|error| log::warn!("latched message not decodable: {error}"))
                     .ok()
             }
         })

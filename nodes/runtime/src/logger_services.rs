@@ -1,4 +1,4 @@
-//! The services `~/get_logger_levels` and `~/set_logger_levels`, which are always there.
+//! The services `~/get_logger_levels` and `~/set_logger_levels`, which every node has.
 
 use lattice_msgs::rcl_interfaces::{
     GetLoggerLevels, GetLoggerLevelsRequest, GetLoggerLevelsResponse, LoggerLevel, SetLoggerLevels,
@@ -10,10 +10,10 @@ use super::logging;
 use super::node::Node;
 use super::service::Server;
 
-/// Most loggers of one request.
+/// Limit of loggers per request.
 const MAX_LOGGERS: usize = 100;
 
-/// Serves both.
+/// Serves both services.
 pub(crate) fn serve(node: &Node) -> Result<[Server; 2], RuntimeError> {
     Ok([
         node.service::<GetLoggerLevels>("~/get_logger_levels", |request| get(&request))?,
@@ -36,7 +36,7 @@ fn set(request: &SetLoggerLevelsRequest) -> SetLoggerLevelsResponse {
     let set_one = |(place, wanted): (usize, &LoggerLevel)| {
         let set = match place < MAX_LOGGERS {
             true => logging::set_level(&wanted.name, wanted.level),
-            false => Err(format!("more than {MAX_LOGGERS} loggers at once")),
+            false => Err(format!("request exceeds {MAX_LOGGERS} loggers")),
         };
         SetLoggerLevelsResult {
             successful: set.is_ok(),

@@ -1,4 +1,4 @@
-//! The other ends of one publisher or subscription, in this process and outside.
+//! Matched peers of one endpoint, in this process and in others.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
@@ -6,16 +6,16 @@ use std::sync::{Arc, Mutex};
 use super::port::EndpointId;
 use super::sync::{Changed, lock};
 
-/// Peers of one endpoint that are remembered, at most.
+/// Limit of stored peers per endpoint.
 const MAX_PEERS: usize = 4096;
 
-/// Reasons that are told of one endpoint, at most: others name their types as they like.
+/// Limit of warnings per endpoint: type names of peers are arbitrary.
 const MAX_WARNINGS: usize = 16;
 
-/// Called when a peer joins; must return at once.
+/// Called at each match; must return at once.
 pub(crate) type OnJoined = Box<dyn FnMut() + Send>;
 
-/// The endpoints at the other end of one publisher, subscription or server.
+/// Matched peers of one publisher, subscription or server.
 pub(crate) struct Peers {
     topic: String,
     peer_kind: &'static str,
@@ -29,7 +29,7 @@ pub(crate) struct Peers {
 struct State {
     remote: BTreeSet<EndpointId>,
     local: usize,
-    /// Number of the change that `local` was counted at.
+    /// Change counter at which `local` was counted.
     local_change: u64,
     incompatible: BTreeSet<EndpointId>,
     warned: BTreeSet<String>,
@@ -57,7 +57,7 @@ impl Peers {
         lock(&self.state).remote.len()
     }
 
-    /// Completes with such a peer in another process once one is known.
+    /// Completes with a remote peer that satisfies `wanted` once it is known.
     pub(crate) async fn known(&self, wanted: impl Fn(&EndpointId) -> bool) -> EndpointId {
         let known = || {
             let state = lock(&self.state);
@@ -66,28 +66,28 @@ impl Peers {
         self.joined.until(known).await
     }
 
-    /// Peers here and elsewhere.
+    /// Peers in all processes.
     pub(crate) fn count(&self) -> usize {
         let state = lock(&self.state);
         state.remote.len().saturating_add(state.local)
     }
 
-    /// Peers whose QoS does not match ours.
+    /// Incompatible peers.
     pub(crate) fn incompatible_count(&self) -> usize {
         lock(&self.state).incompatible.len()
     }
 
-    /// Calls `callback` for every peer that joins, and now if there is one already.
+    /// Calls `callback` at every match, and now if a peer is matched already.
     pub(crate) fn on_joined(&self, callback: OnJoined) {
         let callback = Arc::new(Mutex::new(callback));
-        // Registered before counting: a peer that joins meanwhile is called for twice rather than never.
+        // Registered before counting: a concurrent match may call twice, but is never missed.
         lock(&self.on_joined).push(Arc::clone(&callback));
         if self.count() > 0 {
             lock(&callback)();
         }
     }
 
-    /// A peer in another process has matched.
+    /// Adds a matched peer of another process.
     pub(crate) fn add(&self, peer: EndpointId) {
         let mut state = lock(&self.state);
         state.incompatible.remove(&peer);
@@ -99,7 +99,7 @@ impl Peers {
         self.joined(count);
     }
 
-    /// Peers in other processes have gone.
+    /// Removes peers of other processes.
     pub(crate) fn remove(&self, gone: impl Fn(&EndpointId) -> bool) {
         let mut state = lock(&self.state);
         let before = state.remote.len();
@@ -112,8 +112,8 @@ impl Peers {
         }
     }
 
-    /// Sets the number of peers in this process as counted at a change, unless a later change has been
-    /// counted already: counts are handed on outside the lock under which they were made.
+    /// Sets the number of local peers as of a change, unless a later change was
+    /// counted already: counts are passed on outside their lock.
     pub(crate) fn set_local(&self, local: usize, change: u64) {
         let mut state = lock(&self.state);
         if change < state.local_change {
@@ -128,7 +128,7 @@ impl Peers {
         }
     }
 
-    /// A peer asks for, or offers, a QoS or a type that does not go with ours.
+    /// Records a peer with incompatible QoS or type.
     pub(crate) fn incompatible(&self, peer: EndpointId, policy: &str) {
         let mut state = lock(&self.state);
         if state.incompatible.len() < MAX_PEERS {
@@ -147,8 +147,8 @@ impl Peers {
         self.call_back();
     }
 
-    /// Calls for peers that are there as if one had joined.
-    pub(crate) fn meet_again(&self) {
+    /// Calls the callbacks as if the present peers had just matched.
+    pub(crate) fn replay_match_events(&self) {
         if self.count() > 0 {
             self.call_back();
         }
@@ -163,7 +163,7 @@ impl Peers {
     }
 }
 
-/// Text of a peer that does not go with us; of publishers and subscriptions it begins as that of rclcpp.
+/// Warning about an incompatible peer; for publishers and subscriptions it begins as in rclcpp.
 fn conflict(topic: &str, kind: &str, policy: &str) -> String {
     let remedy = format!("set qos.{topic}.* or the other side's QoS");
     match kind {
@@ -178,7 +178,7 @@ fn conflict(topic: &str, kind: &str, policy: &str) -> String {
             "New subscription discovered on topic '{topic}', requesting incompatible QoS. No messages \
              will be sent to it. Last incompatible policy: {policy}; {remedy}"
         ),
-        _ => format!("{topic}: a {kind} is not heard because of its QoS: {policy}; {remedy}"),
+        _ => format!("{topic}: a {kind} has incompatible QoS: {policy}; {remedy}"),
     }
 }
 
@@ -250,7 +250,7 @@ mod tests {
         peers.incompatible(peer(1), "reliability");
         peers.incompatible(peer(1), "reliability");
         assert_eq!(peers.incompatible_count(), 1);
-        peers.remove(|p| p.is_beside(&peer(1)));
+        peers.remove(|p| p.same_participant(&peer(1)));
         assert_eq!(peers.incompatible_count(), 0);
     }
 

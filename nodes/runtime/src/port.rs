@@ -1,4 +1,4 @@
-//! The port of the transport: everything that the runtime asks of the network, in terms of no implementation.
+//! Abstract transport: all network functions that the runtime uses, independent of the implementation.
 
 use std::borrow::Cow;
 use std::future::poll_fn;
@@ -14,36 +14,36 @@ use super::error::RuntimeError;
 use super::qos::Qos;
 use super::remote::{GraphRole, RemotePublisher};
 
-/// Buffer of a sample that writers share.
+/// Sample buffer shared by writers.
 pub(crate) use bytes::Bytes;
 
-/// Length of the encapsulation header in front of every CDR sample.
+/// Length of the encapsulation header of every CDR sample.
 pub(crate) const ENCAPSULATION_BYTES: usize = 4;
 
-/// Topic of the messages that name the nodes of a process, on DDS.
+/// DDS topic of the messages that list the nodes of a process.
 pub(crate) const GRAPH_TOPIC: &str = "ros_discovery_info";
 
-/// Receive buffer asked of every socket, in bytes.
+/// Requested receive buffer of every socket, bytes.
 pub(crate) const RECEIVE_BUFFER_BYTES: usize = 32 << 20;
 
-/// Identity of an endpoint: on DDS its GUID, of which twelve bytes name the participant; on Zenoh its gid.
+/// Identity of an endpoint: on DDS its GUID, whose first twelve bytes identify the participant; on Zenoh its gid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct EndpointId(pub [u8; 16]);
 
 impl EndpointId {
-    /// First two bytes, which the vendor of the implementation has been given.
+    /// Vendor id: first two bytes.
     pub(crate) fn vendor(&self) -> [u8; 2] {
         let [first, second, ..] = self.0;
         [first, second]
     }
 
-    /// All bytes in hexadecimal digits.
+    /// Hexadecimal form.
     pub(crate) fn hex(&self) -> String {
         self.0.iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
     /// True for two endpoints of one participant.
-    pub(crate) fn is_beside(&self, other: &Self) -> bool {
+    pub(crate) fn same_participant(&self, other: &Self) -> bool {
         self.0.first_chunk::<12>() == other.0.first_chunk()
     }
 }
@@ -55,21 +55,21 @@ pub(crate) enum EndpointKind {
     Writer,
 }
 
-/// One sample among all samples.
+/// Identity of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct SampleId {
-    /// The writer that sent it, or what the sender names in its place.
+    /// Its writer, or the endpoint that the sender names instead.
     pub writer: EndpointId,
-    /// Its number there; 0 where the sender does not say.
+    /// Its sequence number; 0 if the sender gives none.
     pub number: i64,
 }
 
-/// Origin of a sample that was received.
+/// Origin of a received sample.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Origin {
     /// The sample itself.
     pub sample: SampleId,
-    /// The request it belongs to, where the sender said so.
+    /// Related request, if the sender gives one.
     pub related: Option<SampleId>,
 }
 
@@ -77,11 +77,11 @@ pub(crate) struct Origin {
 #[derive(Clone, Debug)]
 #[cfg_attr(not(feature = "zenoh"), expect(dead_code, reason = "DDS has no nodes"))]
 pub(crate) struct PortNode {
-    /// Its number in the process.
+    /// Index in the process.
     pub number: usize,
     /// Namespace, such as `/` or `/robot`.
     pub namespace: String,
-    /// Name in it.
+    /// Name without namespace.
     pub name: String,
 }
 
@@ -95,7 +95,7 @@ pub(crate) struct PortTopic<'a> {
     pub name: &'a str,
     /// Type, such as `sensor_msgs/msg/Imu`.
     pub ros_type: &'a str,
-    /// Hash of the type where it may be another than that of our message of this name.
+    /// Type hash, if it may differ from the hash of our message with this name.
     pub type_hash: Option<&'a str>,
 }
 
@@ -115,13 +115,13 @@ pub(crate) struct PortService<'a> {
     pub response: &'a str,
 }
 
-/// Form of requests and replies.
+/// Representation of requests and replies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ServiceForm {
-    /// Samples of two topics, in the form of the rmw of the peer. A reply is lost to a client whose reader is
+    /// Samples on two topics, in the format of the peer's rmw. A reply is lost to a client whose reader is
     /// not matched yet.
     Topics,
-    /// Bare messages; the transport names the request and finds the way back.
+    /// Bare messages; the transport identifies the request and routes the reply.
     Queries,
 }
 
@@ -129,66 +129,66 @@ pub(crate) enum ServiceForm {
 pub(crate) struct ServerEnds {
     pub form: ServiceForm,
     pub requests: Box<dyn SampleReader>,
-    /// Each reply names its request.
+    /// Writer of replies; each is written with its request.
     pub replies: Arc<dyn SampleWriter>,
 }
 
 /// Both ends of a client.
 pub(crate) struct ClientEnds {
     pub form: ServiceForm,
-    /// A request names itself where the form is [`ServiceForm::Queries`].
+    /// Writer of requests; with [`ServiceForm::Queries`] a request identifies itself.
     pub requests: Arc<dyn SampleWriter>,
     pub answers: Box<dyn SampleReader>,
 }
 
-/// Qualities of both ends of a server or client.
+/// QoS of both ends of a server or client.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ServiceQos {
     pub reader: Qos,
     pub writer: Qos,
-    /// Longest sample that is taken, encapsulation header included.
+    /// Longest accepted sample, encapsulation header included.
     pub max_bytes: usize,
 }
 
-/// Policies of a peer that does not go with ours, by their names in rclcpp and in words for the operator.
+/// Incompatible QoS policies, by their names in rclcpp, with an explanation.
 pub(crate) const RELIABILITY_CONFLICT: &str =
-    "RELIABILITY_QOS_POLICY (the subscription asks for reliable, the publisher offers best_effort)";
-pub(crate) const DURABILITY_CONFLICT: &str = "DURABILITY_QOS_POLICY (the subscription asks for transient_local, the publisher offers volatile)";
+    "RELIABILITY_QOS_POLICY (the subscription requests reliable, the publisher offers best_effort)";
+pub(crate) const DURABILITY_CONFLICT: &str = "DURABILITY_QOS_POLICY (the subscription requests transient_local, the publisher offers volatile)";
 
-/// A change of the other ends of our endpoints, or of what there is.
+/// Discovery event.
 #[derive(Clone, Debug)]
 pub(crate) enum PortEvent {
-    /// An endpoint of ours and a peer have found each other.
+    /// A local endpoint and a peer have matched.
     Matched {
         endpoint: EndpointId,
         peer: EndpointId,
     },
-    /// A peer does not go with ours, in this policy of its QoS or in its type.
+    /// A peer has incompatible QoS or type; the policy is given.
     Incompatible {
         endpoint: EndpointId,
         peer: EndpointId,
         policy: Cow<'static, str>,
     },
-    /// There is a publisher, on any topic of ROS.
+    /// A publisher was discovered, on any ROS topic.
     Found {
         peer: EndpointId,
         publisher: Box<RemotePublisher>,
-        /// Its node, where it names one.
+        /// Its node, if announced.
         node: Option<String>,
     },
-    /// There is a subscription or a server.
+    /// A subscription or server was discovered.
     FoundOther {
         peer: EndpointId,
         role: GraphRole,
         name: String,
-        /// Its node, where it names one.
+        /// Its node, if announced.
         node: Option<String>,
     },
-    /// A peer has gone.
+    /// A peer has left.
     Lost { peer: EndpointId },
 }
 
-/// Bytes of samples that are not acknowledged, of a writer that keeps them: 5 s of a lidar that sends 12 MB in each.
+/// Limit of unacknowledged bytes of a writer that keeps them: 5 s of a lidar at 12 MB/s.
 pub(crate) const UNACKNOWLEDGED_BYTES: usize = 64 << 20;
 
 /// A participant on a network.
@@ -196,28 +196,28 @@ pub(crate) trait Transport: Send + Sync {
     /// Identity of the participant.
     fn id(&self) -> EndpointId;
 
-    /// Participants that security keeps out. Each is a warning in the log; to be asked once a second.
-    fn strangers(&self) -> usize {
+    /// Number of participants rejected by DDS Security. Logs a warning for each; call once a second.
+    fn unauthenticated_participants(&self) -> usize {
         0
     }
 
-    /// Announces a node. Where nodes are announced by messages instead, see [`Transport::graph_writer`].
+    /// Announces a node. Transports that announce nodes by messages use [`Transport::graph_writer`].
     fn add_node(&self, _: &PortNode) -> Result<(), RuntimeError> {
         Ok(())
     }
 
-    /// Writer of the messages that name the nodes of a process. `None`: every endpoint names its node itself.
+    /// Writer of node lists. `None`: every endpoint announces its node itself.
     fn graph_writer(&self) -> Option<Result<Arc<dyn SampleWriter>, RuntimeError>> {
         None
     }
 
-    /// Reader of these messages of other processes.
+    /// Reader of the node lists of other processes.
     fn graph_reader(&self) -> Option<Result<Box<dyn SampleReader>, RuntimeError>> {
         None
     }
 
-    /// Makes a writer. One that `keeps` overwrites no sample that a reliable reader has not acknowledged, however
-    /// many there are, within [`UNACKNOWLEDGED_BYTES`].
+    /// Creates a writer. With `keeps`, it never overwrites a sample that a reliable reader has not acknowledged,
+    /// up to [`UNACKNOWLEDGED_BYTES`].
     fn writer(
         &self,
         topic: PortTopic<'_>,
@@ -225,7 +225,7 @@ pub(crate) trait Transport: Send + Sync {
         keeps: bool,
     ) -> Result<Arc<dyn SampleWriter>, RuntimeError>;
 
-    /// Makes a reader that refuses samples longer than `max_bytes`, header included.
+    /// Creates a reader that rejects samples longer than `max_bytes`, header included.
     fn reader(
         &self,
         topic: PortTopic<'_>,
@@ -233,21 +233,21 @@ pub(crate) trait Transport: Send + Sync {
         max_bytes: usize,
     ) -> Result<Box<dyn SampleReader>, RuntimeError>;
 
-    /// Makes both ends of a server.
+    /// Creates both ends of a server.
     fn server(
         &self,
         service: PortService<'_>,
         qos: &ServiceQos,
     ) -> Result<ServerEnds, RuntimeError>;
 
-    /// Makes both ends of a client.
+    /// Creates both ends of a client.
     fn client(
         &self,
         service: PortService<'_>,
         qos: &ServiceQos,
     ) -> Result<ClientEnds, RuntimeError>;
 
-    /// Changes of peers. Only one stream hears them.
+    /// Stream of discovery events. It has one consumer.
     fn events(&self) -> BoxStream<'static, PortEvent>;
 }
 
@@ -256,67 +256,67 @@ pub(crate) trait Transport: Send + Sync {
 pub(crate) enum WriteRefusal {
     /// The send window is full.
     Full,
-    /// In the words of the transport.
+    /// Error of the transport.
     Failed(String),
 }
 
-/// The sending end of a topic.
+/// Sending end of a topic.
 pub(crate) trait SampleWriter: Send + Sync {
     /// Its identity.
     fn id(&self) -> EndpointId;
 
-    /// Writes the body of a little-endian CDR sample, and the request that it answers or is.
+    /// Writes the body of a little-endian CDR sample, with the identity of its request, if any.
     fn write(
         &self,
         body: Bytes,
         related: Option<SampleId>,
     ) -> BoxFuture<'_, Result<(), WriteRefusal>>;
 
-    /// Samples that reliable readers had not acknowledged when they left, and those that are not acknowledged yet.
-    /// None where the transport does not tell.
+    /// Samples not yet acknowledged, or left unacknowledged by reliable readers that have left.
+    /// 0 if the transport does not report them.
     fn unacknowledged(&self) -> u64 {
         0
     }
 
-    /// Waits until every reliable reader has acknowledged. False: not in time.
+    /// Waits until every reliable reader has acknowledged. False: timeout.
     fn wait_for_acknowledgments(&self, patience: Duration) -> bool;
 }
 
-/// Samples that a reader does not have.
+/// Lost samples of a reader.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ReaderLosses {
-    /// Sent by a writer that was heard before and after them, and not received: lost by the network, or given up by the
-    /// writer.
+    /// Missing in the sequence of a writer: lost by the network, or overwritten in the writer's
+    /// history.
     pub on_network: Arc<AtomicU64>,
-    /// Received, and displaced by newer ones before they were taken.
+    /// Received, but overwritten by newer samples before they were taken.
     pub overrun: Arc<AtomicU64>,
 }
 
-/// The receiving end of a topic.
+/// Receiving end of a topic.
 pub(crate) trait SampleReader: Send + Sync {
     /// Its identity.
     fn id(&self) -> EndpointId;
 
-    /// The next sample; see [`SampleReader::next`].
+    /// Polls for the next sample; see [`SampleReader::next`].
     fn poll_next(&self, context: &mut Context<'_>) -> Poll<Result<Origin, String>>;
 
     /// Bytes of the last sample, encapsulation header first.
     fn bytes(&self) -> MutexGuard<'_, Vec<u8>>;
 
-    /// True once a matched writer is known to have matched too, so that its next sample comes here. Always, where the
-    /// transport finds the way by itself.
+    /// True once a matched writer has matched this reader too, so that its next sample arrives. Always true if the
+    /// transport routes by itself.
     fn is_known_to(&self, _: &EndpointId) -> bool {
         true
     }
 
-    /// Counters of the samples that are not had; clones share them.
+    /// Counters of lost samples; clones share them.
     fn losses(&self) -> ReaderLosses;
 }
 
 impl dyn SampleReader + '_ {
-    /// The next sample; its bytes are in [`SampleReader::bytes`] until the next call.
+    /// Awaits the next sample; its bytes are in [`SampleReader::bytes`] until the next call.
     ///
-    /// The error is a sample that cannot be had, in words; the one after it can.
+    /// The error describes a rejected sample; the next call continues with the one after it.
     pub(crate) async fn next(&self) -> Result<Origin, String> {
         poll_fn(|context| self.poll_next(context)).await
     }

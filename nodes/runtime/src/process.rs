@@ -1,4 +1,4 @@
-//! The runtime of a process: one participant, its threads, and the nodes on it.
+//! Runtime of a process: one participant, its threads and its nodes.
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -21,29 +21,29 @@ use super::sync::lock;
 use super::timer::Timer;
 use super::type_description;
 
-/// Between two messages on `/diagnostics`.
+/// Period of `/diagnostics`.
 const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
 
-/// Runs the nodes of a process. Dropping it closes the participant, and peers see it go at once.
+/// Runs the nodes of a process. Dropping it closes the participant, which peers notice at once.
 ///
-/// SIGINT and SIGTERM ask for shutdown while it lives. Not to be dropped on one of its own threads.
+/// While it exists, SIGINT and SIGTERM request shutdown. Must not be dropped on one of its own threads.
 pub struct Runtime {
     shared: Arc<Shared>,
     args: Arc<RosArgs>,
     main: Node,
-    /// All nodes, by their names in the code.
+    /// All nodes, by their default names.
     nodes: Mutex<Vec<(String, Node)>>,
     _signals: SignalWatch,
     _rosout: Option<Arc<rosout::Listener>>,
 }
 
 impl Runtime {
-    /// Starts the runtime and its main node, on the network that the environment names.
+    /// Starts the runtime and its main node, on the network given by the environment.
     pub fn start(default_node_name: &str, args: RosArgs) -> Result<Self, RuntimeError> {
         Self::with_transport(default_node_name, args, &Network::from_env()?)
     }
 
-    /// The same on a network that is given.
+    /// Starts the runtime and its main node on a given network.
     pub fn with_transport(
         default_node_name: &str,
         args: RosArgs,
@@ -80,7 +80,7 @@ impl Runtime {
         Ok(runtime)
     }
 
-    /// The node called `default_name` in the code, made when it is first asked for.
+    /// Node with the default name `default_name`, created at the first call.
     pub fn node(&self, default_name: &str) -> Result<Node, RuntimeError> {
         let mut nodes = lock(&self.nodes);
         if let Some((_, node)) = nodes.iter().find(|(name, _)| name == default_name) {
@@ -91,20 +91,20 @@ impl Runtime {
         Ok(node)
     }
 
-    /// Calls `callback` in every period of the system's steady clock, 1 ms at least, until shutdown or until
+    /// Calls `callback` in every period of the steady clock, at least 1 ms, until shutdown or until
     /// the timer is dropped; never with a period of zero. The period can be changed.
     ///
-    /// It runs on the io thread and must return at once. Periods that were missed are left out.
+    /// It runs on the io thread and must return at once. Missed periods are skipped.
     pub fn timer(&self, period: Duration, callback: impl FnMut() + Send + 'static) -> Timer {
         Timer::start(&self.shared.io, period, callback)
     }
 
-    /// A handle to ask for shutdown.
+    /// Handle to request shutdown.
     pub fn shutdown_handle(&self) -> Shutdown {
         self.shared.shutdown.clone()
     }
 
-    /// Blocks until shutdown is asked for, then ends timers, sends what is queued, and leaves.
+    /// Blocks until a shutdown request, then stops timers, sends queued messages, and leaves.
     ///
     /// The error is a thread that panicked.
     pub fn spin(&self) -> Result<(), RuntimeError> {
@@ -116,8 +116,8 @@ impl Runtime {
         }
     }
 
-    /// Waits until the handlers have had every message that waits in this process, for two seconds at
-    /// most. Not from a handler, callback or timer.
+    /// Waits, for two seconds at most, until the handlers have processed all queued messages of this process.
+    /// Not from a handler, callback or timer.
     pub fn work_off(&self) {
         self.shared.work_off(deadline());
     }
@@ -148,7 +148,7 @@ impl Runtime {
             if let Some(shared) = shared.upgrade() {
                 let transport = shared.transport_status(&fqn);
                 let message = shared.tasks.message(clock.now_ns(), transport);
-                // A full queue is counted, and stated in the next message.
+                // A full queue is counted and reported in the next message.
                 let _ = publisher.publish(message);
             }
         });
@@ -157,7 +157,7 @@ impl Runtime {
     }
 }
 
-/// A node with its parameter services.
+/// Creates a node with its parameter services.
 fn node(
     shared: &Arc<Shared>,
     args: &Arc<RosArgs>,

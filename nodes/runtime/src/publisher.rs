@@ -9,8 +9,8 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::cdr;
 
 use super::error::PublishError;
-use super::gate::Gate;
 use super::graph::NodeEndpoint;
+use super::lifecycle_gate::LifecycleGate;
 use super::local_bus::LocalEndpoint;
 use super::outbox::{Outbox, Serialize};
 use super::peers::Peers;
@@ -19,29 +19,29 @@ use super::qos::Qos;
 use super::shutdown::Shutdown;
 use super::sync::lock;
 
-/// The parts that both kinds of publisher are made of.
+/// Parts common to both kinds of publisher.
 pub(crate) struct PublisherParts {
     pub writer: Arc<Outbox>,
     pub peers: Arc<Peers>,
     pub local: LocalEndpoint,
-    /// Messages for late joiners; none where they are not kept.
+    /// Messages for late joiners; `None` if volatile.
     pub latch: Option<Mutex<Latch>>,
     pub shutdown: Shutdown,
     pub _graph: NodeEndpoint,
 }
 
-/// The last messages of a latched publisher that no other process has listened to yet. They are
-/// serialised when the first one does; from then on DDS keeps them.
+/// Last messages of a latched publisher without remote subscribers so far. They are
+/// serialized for the first one; from then on DDS keeps them.
 pub(crate) struct Latch {
     kept: VecDeque<Serialize>,
     depth: usize,
-    /// Late joiners get everything anew: for DDS there is nothing to keep while nobody listens.
+    /// True if the node republishes for late joiners: DDS has nothing to keep without subscribers.
     renewed: bool,
     heard: bool,
 }
 
 impl Latch {
-    /// Keeps as many messages as `qos` has for late joiners.
+    /// Keeps as many messages as `qos` specifies for late joiners.
     pub(crate) fn new(qos: &Qos) -> Self {
         Self {
             kept: VecDeque::new(),
@@ -73,7 +73,7 @@ impl PublisherParts {
         Ok(())
     }
 
-    /// Hands kept messages to DDS once another process listens.
+    /// Passes kept messages to DDS once another process subscribes.
     pub(crate) fn peer_joined(&self) {
         if let Some(latch) = &self.latch
             && self.peers.remote() > 0
@@ -91,11 +91,11 @@ impl PublisherParts {
     }
 }
 
-/// Publishes messages of one type on one topic. Clones share the publisher.
+/// Publisher of one message type on one topic. Clones share the publisher.
 pub struct Publisher<M> {
     pub(crate) parts: Arc<PublisherParts>,
-    /// The gate of a managed node.
-    pub(crate) gate: Option<Arc<Gate>>,
+    /// Lifecycle gate of the node.
+    pub(crate) gate: Option<Arc<LifecycleGate>>,
     pub(crate) message: PhantomData<fn(M)>,
 }
 
@@ -112,9 +112,9 @@ impl<M> Clone for Publisher<M> {
 impl<M: RosMessage> Publisher<M> {
     /// Publishes a message; returns at once.
     ///
-    /// Subscriptions in this runtime get the same `Arc`. For others it is queued, to be serialized
-    /// on the publisher thread; a full queue is an error, and counted. A managed node that is not
-    /// active publishes nothing.
+    /// Subscriptions in this runtime receive the same `Arc`. For others it is queued and serialized
+    /// on the publisher thread; a full queue is an error, and counted. An inactive managed node
+    /// publishes nothing.
     pub fn publish(&self, message: impl Into<Arc<M>>) -> Result<(), PublishError> {
         if self.gate.as_ref().is_some_and(|gate| !gate.is_open()) {
             return Ok(());
@@ -126,17 +126,17 @@ impl<M: RosMessage> Publisher<M> {
     }
 }
 
-/// Publishes messages that are CDR bytes already, as a bag player has them.
+/// Publisher of messages that are CDR bytes already, as in a bag.
 #[derive(Clone)]
 pub struct RawPublisher {
     pub(crate) parts: Arc<PublisherParts>,
 }
 
 impl RawPublisher {
-    /// Publishes a message of plain little-endian CDR, encapsulation header included, as it is.
+    /// Publishes a message of plain little-endian CDR, encapsulation header included, unchanged.
     ///
-    /// Waits while the queue is full, so nothing is lost on this side; the end of that time and a request
-    /// to shut down end the wait with an error. Not to be called from a handler, callback or timer.
+    /// Waits while the queue is full, so nothing is dropped here; the timeout and a shutdown request end the
+    /// wait with an error. Not to be called from a handler, callback or timer.
     pub fn publish_within(&self, cdr: Vec<u8>, patience: Duration) -> Result<(), PublishError> {
         let mut body = Bytes::from(cdr);
         if body.get(..2) != Some(&[0, 1]) || body.len() < ENCAPSULATION_BYTES {
@@ -148,7 +148,7 @@ impl RawPublisher {
         }
         if let Err(error) = self.parts.local.publish_cdr(&body) {
             let topic = self.topic();
-            log::warn!("{topic}: message not given to this process: {error}");
+            log::warn!("{topic}: message not delivered in this process: {error}");
         }
         if self.parts.latch.is_none() && self.parts.peers.remote() == 0 {
             return Ok(());
@@ -158,12 +158,12 @@ impl RawPublisher {
         self.parts.writer.send_body_within(body, patience, shutdown)
     }
 
-    /// Messages handed to DDS that reliable subscribers have not acknowledged, or had not when they left.
+    /// Messages passed to DDS and not acknowledged by reliable subscribers, including subscribers that have left.
     pub fn unacknowledged(&self) -> u64 {
         self.parts.writer.unacknowledged()
     }
 
-    /// Waits until the queue has room for a message of so many bytes. False: not in time. Not to be called from a
+    /// Waits until the queue has room for a message of `bytes`. False: timeout. Not to be called from a
     /// handler, callback or timer.
     pub fn has_room_within(&self, bytes: usize, patience: Duration) -> bool {
         self.parts.writer.has_room_within(bytes, patience)
@@ -178,26 +178,26 @@ macro_rules! shared_by_publishers {
                 self.parts.peers.topic()
             }
 
-            /// Matched subscribers, here and in other processes.
+            /// Matched subscribers in all processes.
             pub fn subscriber_count(&self) -> usize {
                 self.parts.peers.count()
             }
 
-            /// Calls `callback` for every subscriber that joins, and now if there is one already.
+            /// Calls `callback` at every match with a subscriber, and now if one is matched already.
             ///
             /// It runs on a thread of the runtime and must return at once.
             pub fn on_subscriber_joined(&self, callback: impl FnMut() + Send + 'static) {
                 self.parts.peers.on_joined(Box::new(callback));
             }
 
-            /// Waits until the queue is empty and every reliable subscriber in another process has
-            /// acknowledged. False: not in time. Not from a handler, callback or timer.
+            /// Waits until the queue is empty and every reliable remote subscriber has
+            /// acknowledged. False: timeout. Not from a handler, callback or timer.
             pub fn flush(&self, timeout: Duration) -> bool {
                 self.parts.writer.flush(timeout)
             }
 
-            /// True if no message waits in the queue and every reliable subscriber in another process has
-            /// acknowledged all. Over Zenoh, which knows no acknowledgements: handed over to the link.
+            /// True if the queue is empty and every reliable remote subscriber has
+            /// acknowledged all. Over Zenoh, which has no acknowledgements: passed to the link.
             pub fn is_acknowledged(&self) -> bool {
                 self.parts.writer.is_acknowledged()
             }
@@ -207,12 +207,12 @@ macro_rules! shared_by_publishers {
                 self.parts.writer.dropped()
             }
 
-            /// Messages handed to DDS for other processes.
+            /// Messages passed to DDS for other processes.
             pub fn sent(&self) -> u64 {
                 self.parts.writer.sent()
             }
 
-            /// Bytes of them as they were serialised, without headers.
+            /// Serialized bytes of these messages, without headers.
             pub fn sent_bytes(&self) -> u64 {
                 self.parts.writer.sent_bytes()
             }

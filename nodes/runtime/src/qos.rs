@@ -1,69 +1,69 @@
-//! Qualities of service of our topics, and their overrides by parameters.
+//! QoS of our topics, and overrides by parameters.
 
 use crate::params::{ParamError, Params};
 
-/// Deepest history a parameter may ask for, samples.
+/// Largest history depth settable by parameter, samples.
 const DEPTH_MAX: usize = 10_000;
 
-/// Reliability: samples that were lost are sent again, or not.
+/// Reliability policy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Reliability {
-    /// They are not.
+    /// Lost samples are not resent.
     BestEffort,
-    /// They are.
+    /// Lost samples are resent.
     Reliable,
 }
 
-/// Durability: readers that join late get the last samples, or not.
+/// Durability policy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Durability {
-    /// They do not.
+    /// Late joiners receive no earlier samples.
     Volatile,
-    /// They do.
+    /// Late joiners receive the last samples.
     TransientLocal,
 }
 
-/// The qualities of a topic; history is always "keep the last `depth`".
+/// QoS of a topic; the history is always "keep last `depth`".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Qos {
-    /// Fate of lost samples.
+    /// Reliability.
     pub reliability: Reliability,
-    /// Fate of samples from before a reader joined.
+    /// Durability.
     pub durability: Durability,
-    /// Samples kept, at least 1.
+    /// History depth, at least 1.
     pub depth: usize,
-    /// Samples of a transient-local writer that readers which join late get; `depth` if none is given.
+    /// Samples that a transient-local writer keeps for late joiners; `depth` if `None`.
     pub kept: Option<usize>,
 }
 
 impl Qos {
     /// Clouds of a headset: matches every driver.
     pub const SENSOR: Qos = Qos::best_effort(5);
-    /// Point clouds, in and between our nodes: line scanners send hundreds of small ones a second, in
-    /// bursts when they waited for a pose.
+    /// Point clouds, in and between our nodes: line scanners send hundreds of small clouds per second, in
+    /// bursts after waiting for a pose.
     pub const SCANS: Qos = Qos::best_effort(20);
-    /// INS, IMU and GNSS in: 2 s at 100 Hz, for interpolation.
+    /// Inputs of INS, IMU and GNSS: 2 s at 100 Hz, for interpolation.
     pub const INS: Qos = Qos::best_effort(200);
-    /// The map: room for the chunks of a keyframe, at most 60 kB each. Late joiners match as with every
-    /// latched topic, and get a new keyframe, not a history of old ones.
+    /// The map: depth for the chunks of a keyframe, at most 60 kB each. Late joiners match as with every
+    /// latched topic, but receive a new keyframe instead of a history.
     pub const MAP: Qos = Qos::latched(500).keeping(1);
-    /// Markers: room for all chunks, at most 60 kB each; all are drawn anew for late joiners.
+    /// Markers: depth for all chunks, at most 60 kB each; all are republished for late joiners.
     pub const MARKERS: Qos = Qos::latched(500).keeping(1);
-    /// Small results of which the last one counts: origin, calibration.
+    /// Small results of which only the last matters: origin, calibration.
     pub const LATCHED: Qos = Qos::latched(1);
-    /// Changes of the map since a keyframe.
+    /// Map updates since a keyframe.
     pub const DELTAS: Qos = Qos::reliable(100);
-    /// `/tf`, both ends.
+    /// `/tf`, publisher and subscription.
     pub const TF: Qos = Qos::reliable(100);
-    /// `/tf_static`, the publisher: one message with all its transforms.
+    /// `/tf_static`, publisher: one message with all its transforms.
     pub const TF_STATIC: Qos = Qos::latched(1);
-    /// `/tf_static`, the listener: the messages of many publishers.
+    /// `/tf_static`, subscription: the messages of many publishers.
     pub const TF_STATIC_LISTENER: Qos = Qos::latched(100);
     /// `/diagnostics`.
     pub const DIAGNOSTICS: Qos = Qos::reliable(10);
-    /// `/clock`, the reader: matches every player and simulator.
+    /// `/clock`, subscription: matches every player and simulator.
     pub const CLOCK: Qos = Qos::best_effort(1);
-    /// `/clock`, the player: matches every reader.
+    /// `/clock`, publisher: matches every subscription.
     pub const CLOCK_PLAYER: Qos = Qos::reliable(1);
     /// `/rosout`.
     pub const ROSOUT: Qos = Qos::latched(1000);
@@ -71,10 +71,10 @@ impl Qos {
     pub const PARAMETER_EVENTS: Qos = Qos::reliable(1000);
     /// Services.
     pub const SERVICES: Qos = Qos::reliable(10);
-    /// Requests of a server: those that come while it is at work wait for it; of more, the oldest are lost
+    /// Requests of a server: requests queue while it is busy; beyond the depth the oldest are lost
     /// and counted.
     pub const REQUESTS: Qos = Qos::reliable(1024);
-    /// The default of ROS.
+    /// Default QoS of ROS.
     pub const DEFAULT: Qos = Qos::reliable(10);
 
     /// Best effort, volatile.
@@ -107,7 +107,7 @@ impl Qos {
         }
     }
 
-    /// The same with fewer samples for late joiners.
+    /// The same QoS with fewer samples for late joiners.
     pub const fn keeping(self, samples: usize) -> Qos {
         Qos {
             kept: Some(samples),
@@ -115,7 +115,7 @@ impl Qos {
         }
     }
 
-    /// Samples that late joiners get: none of a volatile writer, else at least 1.
+    /// Samples for late joiners: none of a volatile writer, else at least 1.
     pub fn kept(&self) -> usize {
         match self.durability {
             Durability::Volatile => 0,
@@ -127,8 +127,8 @@ impl Qos {
 
     /// Applies `qos.<topic>.reliability`, `.durability` and `.depth`.
     ///
-    /// The topic is named as the node's code names it (`map`) or by its full name (`/robot/map`),
-    /// which wins.
+    /// The topic is given as in the node's code (`map`) or by its full name (`/robot/map`), which takes
+    /// precedence.
     pub fn with_overrides(
         self,
         params: &Params,
@@ -164,7 +164,7 @@ const DURABILITIES: [(&str, Durability); 2] = [
     ("transient_local", Durability::TransientLocal),
 ];
 
-/// One of two words, whose default is a value.
+/// Reads one of two words; the default is a value.
 fn choose<T: Copy + PartialEq>(
     params: &Params,
     key: &str,

@@ -1,18 +1,18 @@
-//! Endpoints in other processes, as discovery tells of them.
+//! Discovered endpoints of other processes.
 
 use super::qos::{Durability, Reliability};
 
 /// Longest name of a topic or type, bytes.
 const MAX_NAME_BYTES: usize = 512;
 
-/// Role of an endpoint in the graph of nodes.
+/// Role of an endpoint in the ROS graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum GraphRole {
     /// Publishes a topic.
     Publisher,
     /// Subscribes to a topic.
     Subscriber,
-    /// Answers calls of a service.
+    /// Serves a service.
     Server,
 }
 
@@ -23,16 +23,16 @@ pub struct RemotePublisher {
     pub topic: String,
     /// Type, such as `tf2_msgs/msg/TFMessage`.
     pub type_name: String,
-    /// Hash of the type (`RIHS01_...`), where it is announced.
+    /// Type hash (`RIHS01_...`), if announced.
     pub type_hash: Option<String>,
-    /// Reliability that it offers.
+    /// Offered reliability.
     pub reliability: Reliability,
-    /// Durability that it offers.
+    /// Offered durability.
     pub durability: Durability,
 }
 
 impl RemotePublisher {
-    /// The publisher of a DDS writer; none where it is none of a ROS topic.
+    /// Publisher of a DDS writer; `None` if its topic is not a ROS topic.
     pub(crate) fn of(
         (dds_name, dds_type): (&str, &str),
         user_data: &[u8],
@@ -43,7 +43,7 @@ impl RemotePublisher {
         Self::on(topic, dds_type, hash.as_deref(), (reliability, durability))
     }
 
-    /// A publisher on a full topic name; none if that or the type is none.
+    /// Publisher on a full topic name; `None` if the name or type is invalid.
     pub(crate) fn on(
         topic: &str,
         dds_type: &str,
@@ -69,11 +69,11 @@ impl RemotePublisher {
 fn ros_type(dds_type: &str) -> Option<String> {
     let (package, name) = dds_type.strip_suffix('_')?.split_once("::dds_::")?;
     let name = format!("{}/{name}", package.replace("::", "/"));
-    // Of the three parts of a ROS type.
+    // Valid only with the three parts of a ROS type.
     lattice_msgs::dds_type_name(&name).map(|_| name)
 }
 
-/// Value of `typehash` in USER_DATA, as rmw_dds_common writes it.
+/// Value of `typehash` in USER_DATA, in the format of rmw_dds_common.
 fn announced_hash(user_data: &[u8]) -> Option<String> {
     let text = std::str::from_utf8(user_data).ok()?;
     let mut pairs = text.split(';').filter_map(|pair| pair.split_once('='));
@@ -81,7 +81,7 @@ fn announced_hash(user_data: &[u8]) -> Option<String> {
     is_type_hash(hash).then(|| hash.to_owned())
 }
 
-/// True for a type hash of the only version there is.
+/// True for a valid type hash of version 1, the only version.
 pub(crate) fn is_type_hash(text: &str) -> bool {
     let digits = text.strip_prefix("RIHS01_").unwrap_or_default();
     digits.len() == 64 && digits.bytes().all(|digit| digit.is_ascii_hexdigit())

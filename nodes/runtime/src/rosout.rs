@@ -1,4 +1,4 @@
-//! The log of the process on `/rosout`.
+//! Publication of the process's log on `/rosout`.
 
 use std::sync::{Mutex, Weak};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -12,42 +12,42 @@ use super::logging;
 use super::publisher::Publisher;
 use super::sync::lock;
 
-/// Records that wait to be published; the oldest give way.
+/// Queue length for records; the oldest are dropped.
 const QUEUE_RECORDS: usize = 512;
 
-/// Longest text that is published, in bytes.
+/// Longest published text, bytes.
 const MAX_TEXT_BYTES: usize = 16 << 10;
 
-/// The runtimes of this process that hear the log.
+/// Runtimes of this process that publish the log.
 static LISTENERS: Mutex<Vec<Weak<Listener>>> = Mutex::new(Vec::new());
 
-/// Hears the log while it lives.
+/// Subscription to the log; dropping it ends it.
 pub(crate) struct Listener {
     sender: Sender<Log>,
 }
 
-/// A listener to the log, and the records for [`publish`].
+/// Subscribes to the log; returns the queue for [`publish`].
 pub(crate) fn listen() -> (std::sync::Arc<Listener>, Receiver<Log>) {
     let (sender, receiver) = bounded(QUEUE_RECORDS);
     let listener = std::sync::Arc::new(Listener { sender });
     lock(&LISTENERS).push(std::sync::Arc::downgrade(&listener));
-    // False for all but the first runtime of the process: one sink serves them all.
+    // False for all but the first runtime of the process: one sink serves all.
     logging::tee(Box::new(hear));
     (listener, receiver)
 }
 
 /// Publishes records until the task is dropped.
 ///
-/// Records may come from any thread, under any lock: only here do they meet publishers.
+/// Records may be logged on any thread, under any lock: publishers are only used here.
 pub(crate) async fn publish(records: Receiver<Log>, publisher: Publisher<Log>) {
     while let Ok(record) = records.recv().await {
-        // A message about a message that was not published would not end.
+        // Logging a publication error here would recurse.
         let _ = publisher.publish(record);
     }
 }
 
 fn hear(record: &Record<'_>, node: &str) {
-    // What is logged while its text is made must find the lock free.
+    // Formatting the record may log; the lock must be free then.
     let listeners: Vec<_> = {
         let mut listeners = lock(&LISTENERS);
         listeners.retain(|listener| listener.strong_count() > 0);

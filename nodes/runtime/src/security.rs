@@ -1,5 +1,5 @@
-//! DDS Security as ROS 2 asks for it: what the environment says, and the files of an enclave in a keystore
-//! of SROS2's layout.
+//! DDS Security in ROS 2: environment variables, and the enclave files of a keystore in the layout
+//! of SROS2.
 
 use std::fs::{self, File};
 use std::io;
@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::names::{NameError, validate_namespace};
 
-/// True if this build can secure participants.
+/// True if this build supports DDS Security.
 pub const BUILT_IN: bool = cfg!(feature = "security");
 
 const ENABLE: &str = "ROS_SECURITY_ENABLE";
@@ -17,7 +17,7 @@ const STRATEGY: &str = "ROS_SECURITY_STRATEGY";
 const KEYSTORE: &str = "ROS_SECURITY_KEYSTORE";
 const ENCLAVE: &str = "ROS_SECURITY_ENCLAVE_OVERRIDE";
 
-/// Files that an enclave must have, in the order of [`Secrets::files`].
+/// Files of an enclave, in the order of [`Secrets::files`].
 const FILES: [&str; 6] = [
     "identity_ca.cert.pem",
     "cert.pem",
@@ -26,69 +26,69 @@ const FILES: [&str; 6] = [
     "governance.p7s",
     "permissions.p7s",
 ];
-/// Certificates that no longer hold; this one may be missing.
+/// Certificate revocation list; optional.
 const REVOKED: &str = "crl.pem";
 
-/// The wish for a secured participant.
+/// DDS Security settings of a participant.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Security {
     /// `ROS_SECURITY_KEYSTORE`.
     pub keystore: Option<PathBuf>,
-    /// `ROS_SECURITY_ENCLAVE_OVERRIDE`: the enclave whose files are taken, whatever the arguments say.
+    /// `ROS_SECURITY_ENCLAVE_OVERRIDE`: overrides the enclave of the arguments.
     pub enclave: Option<String>,
-    /// True if there is to be no participant rather than one without security.
+    /// True: without valid files no participant is created.
     pub enforced: bool,
 }
 
-/// The enclave of a process.
+/// Enclave of a process.
 pub(crate) struct Enclave {
-    /// Its name, which is announced.
+    /// Announced name.
     pub name: String,
-    /// Its files, unless the process is without security.
+    /// Its files; `None` without security.
     pub secrets: Option<Secrets>,
 }
 
-/// Files of an enclave, all of which can be read.
+/// Readable files of an enclave.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Secrets {
     /// Identity CA, certificate, key, permissions CA, governance, permissions.
     pub files: [PathBuf; 6],
-    /// Certificates that were revoked.
+    /// Certificate revocation list.
     pub revoked: Option<PathBuf>,
 }
 
 /// Reason why a participant cannot be secured.
 #[derive(Debug, Error)]
 pub enum SecurityError {
-    /// No keystore is named.
+    /// No keystore is set.
     #[error("{ENABLE} is true, but {KEYSTORE} names no keystore")]
     NoKeystore,
-    /// Not the name of an enclave.
+    /// Invalid enclave name.
     #[error("{ENCLAVE}: {0}")]
     Enclave(#[from] NameError),
-    /// A file of the enclave is not there or cannot be read.
-    #[error("{ENABLE} is true, but {path}, which security needs, cannot be read: {error}")]
+    /// A file of the enclave is missing or unreadable.
+    #[error("{ENABLE} is true, but the security file {path} cannot be read: {error}")]
     File {
         /// The file.
         path: PathBuf,
-        /// Reason that the system gives.
+        /// Error of the system.
         error: io::Error,
     },
-    /// Built without it.
+    /// Built without the feature.
     #[error("{ENABLE} is true, but this program was built without the feature `security`")]
     NotBuiltIn,
-    /// Keys or permissions do not do.
-    #[error("security refuses the participant of {enclave}: {reason}")]
+    /// Keys or permissions are invalid.
+    #[error("DDS Security rejects the participant of {enclave}: {reason}")]
     Refused {
         /// Folder of the enclave.
         enclave: PathBuf,
-        /// In the words of the transport.
+        /// Error of the transport.
         reason: String,
     },
 }
 
 impl Security {
-    /// Reads an environment; none where security is not switched on. Empty variables count as unset.
+    /// Reads an environment; `None` if security is disabled. Empty variables count as unset.
     pub(crate) fn from_lookup(lookup: impl Fn(&str) -> Option<String>) -> Option<Self> {
         let get = |name| lookup(name).filter(|value| !value.is_empty());
         (get(ENABLE)? == "true").then(|| Self {
@@ -98,7 +98,7 @@ impl Security {
         })
     }
 
-    /// The files for an enclave; without them an error, or a warning where security is not enforced.
+    /// Files of an enclave. Missing ones are an error, or a warning if security is not enforced.
     pub(crate) fn secrets(&self, enclave: &str) -> Result<Option<Secrets>, SecurityError> {
         let found = match BUILT_IN {
             true => self.find(enclave),
@@ -108,7 +108,7 @@ impl Security {
             Ok(secrets) => Ok(Some(secrets)),
             Err(error) if self.enforced => Err(error),
             Err(error) => {
-                log::warn!("going on WITHOUT security, since {STRATEGY} is not Enforce: {error}");
+                log::warn!("continuing WITHOUT security, since {STRATEGY} is not Enforce: {error}");
                 Ok(None)
             }
         }
@@ -117,7 +117,7 @@ impl Security {
     fn find(&self, enclave: &str) -> Result<Secrets, SecurityError> {
         let keystore = self.keystore.as_deref().ok_or(SecurityError::NoKeystore)?;
         let enclave = self.enclave.as_deref().unwrap_or(enclave);
-        // Words and slashes only: no way out of the keystore.
+        // Words and slashes only: the path stays inside the keystore.
         validate_namespace(enclave)?;
         Secrets::find(
             &keystore
@@ -147,18 +147,18 @@ impl Secrets {
         Ok(Self { files, revoked })
     }
 
-    /// The folder that they are in.
+    /// Folder of the files.
     pub(crate) fn folder(&self) -> &Path {
         self.files[0].parent().unwrap_or(Path::new(""))
     }
 }
 
-/// An error unless it is a file that this process may read.
+/// Checks that the path is a readable regular file.
 fn readable(path: &Path) -> Result<(), SecurityError> {
-    // Asked first: to open a pipe is to wait.
+    // Checked before opening: opening a pipe blocks.
     let opened = fs::metadata(path).and_then(|found| match found.is_file() {
         true => File::open(path).map(drop),
-        false => Err(io::Error::other("it is no regular file")),
+        false => Err(io::Error::other("not a regular file")),
     });
     opened.map_err(|error| SecurityError::File {
         path: path.to_owned(),
@@ -220,7 +220,7 @@ mod tests {
         for name in FILES {
             let error = find("/robot/mapper", None).unwrap_err().to_string();
             let path = folder.join(name).display().to_string();
-            assert!(error.contains(&format!("{path}, which")), "{error}");
+            assert!(error.contains(&format!("{path} cannot be read")), "{error}");
             fs::write(folder.join(name), "").unwrap();
         }
         let secrets = find("/robot/mapper", None).unwrap();

@@ -1,4 +1,4 @@
-//! One request to end, from a signal, a failure or the program itself.
+//! Shutdown request of a process, by a signal, a failure or the program itself.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock, Mutex};
@@ -14,12 +14,12 @@ use smol::future::{block_on, or};
 
 use super::sync::{Changed, lock};
 
-/// Keeps a write beyond the limit of file sizes (`ulimit -f`) from ending the process: it is an error of the write.
+/// Ignores SIGXFSZ: a write beyond the file size limit (`ulimit -f`) becomes an error instead of ending the process.
 pub fn catch_file_size_signal() -> std::io::Result<()> {
     signal_hook::flag::register(SIGXFSZ, Arc::default()).map(drop)
 }
 
-/// A request to end that a runtime, its nodes and signals share. Clones are the same request.
+/// Shutdown request shared by a runtime, its nodes and signals. Clones share the request.
 #[derive(Clone, Default)]
 pub struct Shutdown {
     inner: Arc<Inner>,
@@ -35,11 +35,11 @@ struct Inner {
 struct State {
     requested: bool,
     failed: Option<&'static str>,
-    /// Files that are being written.
+    /// Number of files being written.
     writing: usize,
 }
 
-/// A file that is being written, which a second signal does not interrupt while this lives.
+/// Guard of a file being written, which protects it from a second signal.
 pub struct Writing(Shutdown);
 
 impl Drop for Writing {
@@ -50,23 +50,23 @@ impl Drop for Writing {
 }
 
 impl Shutdown {
-    /// Asks to end. Again has no effect.
+    /// Requests shutdown. Repeated calls have no effect.
     pub fn request(&self) {
         lock(&self.inner.state).requested = true;
         self.inner.changed.notify();
     }
 
-    /// True once asked.
+    /// True after a request.
     pub fn is_requested(&self) -> bool {
         lock(&self.inner.state).requested
     }
 
-    /// Blocks until asked.
+    /// Blocks until a request.
     pub fn wait(&self) {
         block_on(self.requested());
     }
 
-    /// Blocks until asked, or for this long.
+    /// Blocks until a request, or for `timeout`.
     pub fn wait_timeout(&self, timeout: Duration) {
         let late = async {
             Timer::after(timeout).await;
@@ -74,13 +74,13 @@ impl Shutdown {
         block_on(or(self.requested(), late));
     }
 
-    /// Completes when asked.
+    /// Completes at a request.
     pub(crate) async fn requested(&self) {
         let check = || self.is_requested().then_some(());
         self.inner.changed.until(check).await;
     }
 
-    /// Begins to write a file that a second signal is not to interrupt.
+    /// Creates a guard for a file that a second signal must not interrupt.
     pub fn writing(&self) -> Writing {
         let mut state = lock(&self.inner.state);
         state.writing = state.writing.saturating_add(1);
@@ -91,22 +91,22 @@ impl Shutdown {
         lock(&self.inner.state).writing > 0
     }
 
-    /// Asks to end because a thread cannot go on.
+    /// Requests shutdown because a thread has failed.
     pub(crate) fn fail(&self, thread: &'static str) {
         lock(&self.inner.state).failed.get_or_insert(thread);
         self.request();
     }
 
-    /// The thread that could not go on.
+    /// The failed thread.
     pub(crate) fn failed_thread(&self) -> Option<&'static str> {
         lock(&self.inner.state).failed
     }
 }
 
-/// Watches of this process; signals keep their default meaning while there is none.
+/// Number of signal watches; without one, signals have their default action.
 static WATCHES: Mutex<usize> = Mutex::new(0);
 
-/// True where a signal ends the process at once. `None`: the handler could not be registered.
+/// True if a signal ends the process at once. `None`: the handler could not be registered.
 static AT_ONCE: LazyLock<Option<Arc<AtomicBool>>> = LazyLock::new(|| {
     let at_once = Arc::new(AtomicBool::new(true));
     let registered = SIGNALS
@@ -117,7 +117,7 @@ static AT_ONCE: LazyLock<Option<Arc<AtomicBool>>> = LazyLock::new(|| {
 
 const SIGNALS: [i32; 2] = [SIGINT, SIGTERM];
 
-/// Time after the first signal in which a second one is taken for the same: `ros2 launch` without a
+/// Time after the first signal in which a second one counts as the same request: `ros2 launch` without a
 /// terminal sends two.
 const SAME_REQUEST: Duration = Duration::from_secs(3);
 
@@ -127,7 +127,7 @@ fn set_at_once(value: bool) {
     }
 }
 
-/// Signals that a watch has had.
+/// Signals received by a watch.
 #[derive(Default)]
 struct Had {
     first: Option<Instant>,
@@ -137,11 +137,11 @@ struct Had {
 /// Effect of a signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Effect {
-    /// The process is to end in good order.
+    /// Begin an orderly shutdown.
     Request,
-    /// None: it ends already.
+    /// None: the shutdown is in progress.
     Wait,
-    /// The process ends at once.
+    /// End the process at once.
     Kill,
 }
 
@@ -162,8 +162,8 @@ impl Had {
     }
 }
 
-/// Turns SIGINT and SIGTERM into a request while it lives. A third signal ends the process at once, and
-/// so does a second one that comes late and interrupts no [`Writing`].
+/// Converts SIGINT and SIGTERM into shutdown requests while it exists. A third signal ends the process at once, as
+/// does a late second one without a [`Writing`] guard.
 pub(crate) struct SignalWatch {
     handle: Handle,
     thread: Option<std::thread::JoinHandle<()>>,
@@ -180,7 +180,7 @@ impl SignalWatch {
             .spawn(move || {
                 let mut had = Had::default();
                 for signal in signals.forever() {
-                    // The log comes last: it may block.
+                    // Logged last: logging may block.
                     match had.take(Instant::now(), shutdown.is_writing()) {
                         Effect::Request => {
                             shutdown.request();
@@ -189,7 +189,7 @@ impl SignalWatch {
                         Effect::Wait => {
                             set_at_once(true);
                             log::info!(
-                                "signal {signal}: shutting down already; the next one ends at once"
+                                "signal {signal}: shutdown is in progress; the next signal ends the process"
                             );
                         }
                         Effect::Kill => drop(emulate_default_handler(signal)),
@@ -312,7 +312,7 @@ mod tests {
             assert!(kill.success());
             match signal {
                 0 => until("shutting down"),
-                1 => until("shutting down already"),
+                1 => until("shutdown is in progress"),
                 _ => {}
             }
         }

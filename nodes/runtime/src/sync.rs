@@ -1,4 +1,4 @@
-//! Locks and waiting, shared by all modules.
+//! Locks and notifications, used by all modules.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -7,33 +7,33 @@ use smol::Timer;
 use smol::channel::{Receiver, Sender, bounded};
 use smol::future::or;
 
-/// Locks, poisoned or not: what is protected here is valid at every step.
+/// Locks, ignoring poison: the protected data are valid at every step.
 pub fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A change that any number of tasks and threads may wait for; each change wakes all of them.
+/// Notification for any number of tasks and threads; each change wakes all of them.
 #[derive(Default)]
 pub(crate) struct Changed {
     waiting: Mutex<Vec<Sender<()>>>,
 }
 
 impl Changed {
-    /// Wakes everyone who waits.
+    /// Wakes all waiters.
     pub(crate) fn notify(&self) {
-        // A receiver ends when its sender goes.
+        // Dropping the senders closes their receivers.
         lock(&self.waiting).clear();
     }
 
-    /// Completes when `check` gives a value; asks now and after each change.
+    /// Completes when `check` returns a value; checks now and after each change.
     pub(crate) async fn until<T>(&self, mut check: impl FnMut() -> Option<T>) -> T {
         loop {
-            // Registered before asking, so that no change goes unseen.
+            // Registered before the check, so that no change is missed.
             let change = self.register();
             if let Some(value) = check() {
                 return value;
             }
-            // Ends when the sender goes.
+            // Closes when the sender is dropped.
             let _ = change.recv().await;
         }
     }
@@ -41,14 +41,14 @@ impl Changed {
     fn register(&self) -> Receiver<()> {
         let (sender, change) = bounded(1);
         let mut waiting = lock(&self.waiting);
-        // Those that gave up waiting.
+        // Removes waiters that have given up.
         waiting.retain(|sender| !sender.is_closed());
         waiting.push(sender);
         change
     }
 }
 
-/// Waits until all senders of a channel are dropped. False: not in time.
+/// Waits until all senders of a channel are dropped. False: timeout.
 pub(crate) fn wait_for(dropped: &Receiver<()>, deadline: Instant) -> bool {
     let late = async {
         Timer::at(deadline).await;

@@ -11,7 +11,7 @@ use smol::{Executor, Task};
 use super::shutdown::Shutdown;
 use super::sync::lock;
 
-/// One thread with its tasks. A task that panics ends the process in good order, with a message.
+/// Thread with an executor. A panicking task requests an orderly shutdown, with a message.
 pub(crate) struct TaskThread {
     name: &'static str,
     shutdown: Shutdown,
@@ -29,7 +29,7 @@ impl TaskThread {
         let thread = std::thread::Builder::new()
             .name(name.to_owned())
             .spawn(move || {
-                guarded(name, &for_thread, || run(&runner, &stopped));
+                run_catching_panics(name, &for_thread, || run(&runner, &stopped));
             })?;
         Ok(Self {
             name,
@@ -40,13 +40,13 @@ impl TaskThread {
         })
     }
 
-    /// Runs a task on this thread. Dropping the handle ends the task. `None`: stopped already.
+    /// Spawns a task on this thread. Dropping the handle cancels the task. `None`: already stopped.
     pub(crate) fn spawn(
         &self,
         task: impl Future<Output = ()> + Send + 'static,
     ) -> Option<Task<()>> {
         let (name, shutdown) = (self.name, self.shutdown.clone());
-        // The executor would keep a panic for whoever awaits the task, and nobody does.
+        // The executor stores a panic for the awaiting task, which does not exist.
         let task = AssertUnwindSafe(task).catch_unwind().map(move |result| {
             if result.is_err() {
                 report_panic(name, &shutdown);
@@ -60,7 +60,7 @@ impl TaskThread {
     pub(crate) fn stop(&self) {
         self.stop.close();
         if let Some(thread) = lock(&self.thread).take() {
-            // Its panic has been reported by the thread itself.
+            // The thread has reported its own panic.
             let _ = thread.join();
         }
         let executor = lock(&self.executor).take();
@@ -81,8 +81,8 @@ fn run(executor: &Executor<'static>, stopped: &Receiver<()>) {
     }));
 }
 
-/// Runs the body of a thread; a panic asks the process to shut down instead of passing unseen.
-pub fn guarded(name: &'static str, shutdown: &Shutdown, body: impl FnOnce()) {
+/// Runs the body of a thread; a panic is logged and requests a shutdown of the process.
+pub fn run_catching_panics(name: &'static str, shutdown: &Shutdown, body: impl FnOnce()) {
     if catch_unwind(AssertUnwindSafe(body)).is_err() {
         report_panic(name, shutdown);
     }

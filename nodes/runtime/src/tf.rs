@@ -12,14 +12,14 @@ use super::publisher::Publisher;
 use super::qos::Qos;
 use super::sync::lock;
 
-/// Publishes transforms that change, on `/tf`.
+/// Broadcaster of dynamic transforms, on `/tf`.
 #[derive(Clone)]
 pub struct TfBroadcaster {
     publisher: Publisher<TFMessage>,
 }
 
 impl TfBroadcaster {
-    /// On the node's `/tf`.
+    /// Creates a broadcaster on the node's `/tf`.
     pub fn new(node: &Node) -> Result<Self, RuntimeError> {
         Ok(Self {
             publisher: node.publisher("/tf", Qos::TF)?,
@@ -32,7 +32,7 @@ impl TfBroadcaster {
     }
 }
 
-/// Publishes transforms that stay, on `/tf_static`: all of them in one latched message.
+/// Broadcaster of static transforms, on `/tf_static`: all of them in one latched message.
 #[derive(Clone)]
 pub struct StaticTfBroadcaster {
     publisher: Publisher<TFMessage>,
@@ -40,7 +40,7 @@ pub struct StaticTfBroadcaster {
 }
 
 impl StaticTfBroadcaster {
-    /// On the node's `/tf_static`. One for a node: two would replace each other's message.
+    /// Creates a broadcaster on the node's `/tf_static`. One per node: two would replace each other's message.
     pub fn new(node: &Node) -> Result<Self, RuntimeError> {
         Ok(Self {
             publisher: node.publisher("/tf_static", Qos::TF_STATIC)?,

@@ -14,7 +14,7 @@ const MIN_PERIOD: Duration = Duration::from_millis(1);
 /// A timer; dropping it ends it.
 #[must_use = "dropping a timer ends it"]
 pub struct Timer {
-    /// None where the process ends already.
+    /// `None` during shutdown.
     task: Option<Task<()>>,
     period: Sender<Duration>,
 }
@@ -33,13 +33,13 @@ impl Timer {
         }
     }
 
-    /// Sets the period, which begins now; with zero it is not called.
+    /// Sets the period and restarts it; with zero the callback is not called.
     pub fn set(&self, period: Duration) {
-        // Fails where the process ends already.
+        // Fails during shutdown.
         let _ = self.period.try_send(period);
     }
 
-    /// Lets it run until shutdown.
+    /// Keeps it running until shutdown.
     pub fn detach(self) {
         if let Some(task) = self.task {
             task.detach();

@@ -1,4 +1,4 @@
-//! The service `~/get_type_description`: what the fields of a type are, by the definitions of our messages.
+//! The service `~/get_type_description`: field types from our message definitions.
 
 use lattice_msgs::type_description_interfaces::{
     GetTypeDescription, GetTypeDescriptionRequest, GetTypeDescriptionResponse, TypeSource,
@@ -9,7 +9,7 @@ use super::error::RuntimeError;
 use super::node::Node;
 use super::service::Server;
 
-/// Serves it, unless the parameter `start_type_description_service` is false.
+/// Serves type descriptions, unless the parameter `start_type_description_service` is false.
 pub(crate) fn serve(node: &Node) -> Result<Option<Server>, RuntimeError> {
     match node.params().bool("start_type_description_service", true)? {
         false => Ok(None),
@@ -30,14 +30,14 @@ fn describe(request: &GetTypeDescriptionRequest) -> Result<GetTypeDescriptionRes
     let name = request.type_name.as_str();
     let (Some(hash), Some(schema)) = (hash_of(name), schema_of(name)) else {
         let name: String = name.chars().take(255).collect();
-        return Err(format!("{name:?} is no type that this program knows"));
+        return Err(format!("unknown type {name:?}"));
     };
     if hash != request.type_hash {
         let asked: String = request.type_hash.chars().take(80).collect();
-        return Err(format!("{name} is known here as {hash}, not as {asked:?}"));
+        return Err(format!("{name} has the hash {hash} here, not {asked:?}"));
     }
     let description = type_description(name, &schema.definition());
-    let type_description = description.ok_or("its definition cannot be read")?;
+    let type_description = description.ok_or("its definition cannot be parsed")?;
     let mut type_sources = Vec::new();
     if request.include_type_sources {
         let others = &type_description.referenced_type_descriptions;
@@ -55,7 +55,7 @@ fn describe(request: &GetTypeDescriptionRequest) -> Result<GetTypeDescriptionRes
 }
 
 fn source(schema: &Schema) -> TypeSource {
-    // A part of a service or an action has no file.
+    // Parts of a service or an action have no file.
     let is_whole = schema.type_name.contains("/msg/");
     let (encoding, text) = match is_whole {
         true => ("msg", schema.text),
@@ -117,14 +117,18 @@ mod tests {
     fn other_types_and_hashes_are_refused() {
         let long = "x".repeat(1 << 20);
         for (name, hash, reason) in [
-            ("std_msgs/msg/None", "", "no type that this program knows"),
+            (
+                "std_msgs/msg/None",
+                "",
+                "unknown type \"std_msgs/msg/None\"",
+            ),
             (
                 "std_msgs/msg/Empty",
                 "RIHS01_00",
-                "known here as RIHS01_20b6",
+                "has the hash RIHS01_20b6",
             ),
-            ("std_msgs/msg/Empty", "", "known here as"),
-            (&long, &long, "no type"),
+            ("std_msgs/msg/Empty", "", "has the hash"),
+            (&long, &long, "unknown type"),
         ] {
             let answer = ask(name, hash);
             assert!(!answer.successful && answer.failure_reason.len() < 500);

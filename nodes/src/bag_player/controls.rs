@@ -1,4 +1,4 @@
-//! The services of rosbag2's player, and what they do to the playback.
+//! Services of rosbag2's player, applied to the playback.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
@@ -15,16 +15,16 @@ use super::playback::Playback;
 use super::steps::Steps;
 use crate::start::NodeError;
 
-/// A change of the playback, or a question; obeyed between two messages, and while one waits. Publishes nothing.
+/// Command or query for the playback, executed between two messages and during waits. Publishes nothing.
 pub(super) type Control = Box<dyn FnOnce(&mut Playback) + Send>;
 
-/// Calls of a service that wait: one of `~/burst` that plays, and one that is refused meanwhile.
+/// Limit of pending calls per service: one `~/burst` in progress, and one that is rejected meanwhile.
 const MAX_PENDING: usize = 2;
 
-/// Servers of the controls, and what was asked of them.
+/// Servers of the controls, and the queue of their commands.
 pub(super) struct Controls {
     _servers: Vec<Server>,
-    // Kept, so that to wait without any is no error.
+    // Kept, so that the channel stays open without servers.
     sender: Sender<Control>,
     waiting: Receiver<Control>,
 }
@@ -73,12 +73,12 @@ impl Controls {
         })
     }
 
-    /// For controls from elsewhere.
+    /// Sender for commands from other sources.
     pub(super) fn sender(&self) -> Sender<Control> {
         self.sender.clone()
     }
 
-    /// The next one, waited for at most so long.
+    /// Waits up to `patience` for the next command.
     pub(super) fn next(&self, patience: Duration) -> Option<Control> {
         self.waiting.recv_timeout(patience).ok()
     }
@@ -95,7 +95,7 @@ fn serve<S: RosService + 'static>(
     serve_later::<S>((node, sender), name, obey)
 }
 
-/// Serves what is answered by the one who obeys, at once or later.
+/// Serves requests whose reply is sent by the executed command, at once or later.
 fn serve_later<S: RosService + 'static>(
     (node, sender): (&Node, &Sender<Control>),
     name: &str,
@@ -107,7 +107,7 @@ fn serve_later<S: RosService + 'static>(
     })
 }
 
-/// Serves what has nothing to answer.
+/// Serves requests with an empty reply.
 fn answer<S: RosService + 'static>(
     to: (&Node, &Sender<Control>),
     name: &str,

@@ -1,4 +1,4 @@
-//! Keys of a player in a terminal, as `ros2 bag play` has them.
+//! Keyboard controls of a player in a terminal, as in `ros2 bag play`.
 
 use std::io::{IsTerminal, Read, stdin};
 use std::sync::mpsc::Sender;
@@ -11,14 +11,14 @@ use super::controls::Control;
 use super::playback::Playback;
 use super::steps::Steps;
 
-/// Change of the rate by a key.
+/// Factor of the rate per key press.
 const RATE_STEP: f64 = 1.1;
 
-/// Keys without echo and return; the terminal is as it was once this has gone.
+/// Terminal in raw mode; dropping it restores the terminal.
 pub(super) struct Keyboard(Termios);
 
 impl Keyboard {
-    /// Takes the keys of the terminal, if we are before it; none otherwise.
+    /// Reads keys if the process has the terminal in the foreground; `None` otherwise.
     pub(super) fn start(controls: Sender<Control>) -> Option<Self> {
         if !stdin().is_terminal() || !is_foreground() {
             return None;
@@ -29,7 +29,7 @@ impl Keyboard {
         tcsetattr(stdin(), OptionalActions::Now, &modes).ok()?;
         let this = Self(before);
         let thread = thread::Builder::new().name("keyboard".to_owned());
-        // It waits for a key when the process ends.
+        // The thread still waits for a key when the process ends.
         let _ = thread.spawn(move || read_keys(&controls)).ok()?;
         log::info!("space: pause; arrows: right next message, up faster, down slower");
         Some(this)
@@ -38,7 +38,7 @@ impl Keyboard {
 
 impl Drop for Keyboard {
     fn drop(&mut self) {
-        // To change a terminal from behind it would stop the process.
+        // Changing the terminal from the background would stop the process.
         if is_foreground() {
             let _ = tcsetattr(stdin(), OptionalActions::Now, &self.0);
         }
@@ -60,14 +60,14 @@ fn read_keys(controls: &Sender<Control>) {
     }
 }
 
-/// Bytes of a key so far.
+/// Escape sequence read so far.
 #[derive(Default)]
 struct Keys {
     escape: u8,
 }
 
 impl Keys {
-    /// Key that a byte completes.
+    /// Command completed by a byte, if any.
     fn press(&mut self, byte: u8) -> Option<fn(&mut Playback)> {
         let before = std::mem::take(&mut self.escape);
         match (before, byte) {

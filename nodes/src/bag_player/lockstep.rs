@@ -1,4 +1,4 @@
-//! Lockstep: each message of a topic waits until the one before it is answered on another topic.
+//! Lockstep: each message of a topic waits for the reply to the one before it on another topic.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -6,30 +6,30 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use lattice_runtime::qos::{Durability, Qos, Reliability};
-use lattice_runtime::{Load, Node, RemotePublisher, Subscription};
+use lattice_runtime::{Node, RemotePublisher, Subscription, SubscriptionExecutor};
 
 use super::playback::SLICE;
 use crate::start::NodeError;
 
-/// Answers that a subscription holds.
+/// Queue depth of reply subscriptions.
 const DEPTH: usize = 100;
-/// Bytes of CDR before the first field.
+/// Length of the CDR encapsulation header.
 const ENCAPSULATION_BYTES: usize = 4;
 
 /// Topics in lockstep, by their index in the player.
 #[derive(Default)]
 pub(super) struct Lockstep(BTreeMap<usize, Pair>);
 
-/// A played topic and that of its answers.
+/// A played topic and its reply topic.
 struct Pair {
     answers: String,
     awaited: Arc<Awaited>,
-    /// True after an answer that did not come in time, until one comes.
+    /// True after a timeout, until the next reply.
     given_up: bool,
     _subscription: Subscription,
 }
 
-/// Stamp of the message whose answer has not come yet.
+/// Stamp of the message without reply so far.
 #[derive(Default)]
 struct Awaited {
     stamp: Mutex<Option<[u8; 8]>>,
@@ -41,7 +41,7 @@ impl Awaited {
         self.stamp.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes an answer.
+    /// Records a reply.
     fn answer(&self, cdr: &[u8]) {
         let mut stamp = self.lock();
         if stamp.is_some() && *stamp == stamp_of(cdr) {
@@ -50,7 +50,7 @@ impl Awaited {
         }
     }
 
-    /// Waits until nothing is awaited; false after this time or once `go_on`, which is asked on the way, says so.
+    /// Waits until no reply is pending; false after a timeout, or once `go_on` returns false.
     fn wait(&self, patience: Duration, go_on: &mut dyn FnMut() -> bool) -> bool {
         let deadline = Instant::now() + patience;
         loop {
@@ -72,10 +72,10 @@ impl Awaited {
 }
 
 impl Lockstep {
-    /// Pairs of topics: one that is played, and one that answers it with messages of the same stamp.
+    /// Starts pairs of topics: a played one, and one with replies of the same stamp.
     ///
     /// # Errors
-    /// If a topic is not played, or nobody publishes the answers within `patience`.
+    /// If a topic is not played, or the replies have no publisher within `patience`.
     pub(super) fn start(
         pairs: &[String],
         played: &[String],
@@ -105,7 +105,13 @@ impl Lockstep {
             };
             let of = publisher.type_name.as_str();
             let qos = qos_of(&publisher);
-            let subscription = node.subscribe_raw(&answers, of, qos, Load::Large, on_answer)?;
+            let subscription = node.subscribe_raw(
+                &answers,
+                of,
+                qos,
+                SubscriptionExecutor::Dedicated,
+                on_answer,
+            )?;
             let pair = Pair {
                 answers,
                 awaited,
@@ -117,8 +123,8 @@ impl Lockstep {
         Ok(lockstep)
     }
 
-    /// Waits for the answer to the last message of a topic, and awaits that to the next one. A topic whose answers
-    /// do not come is waited for once.
+    /// Waits for the reply to the last message of a topic, then registers the next message. After a timeout the topic
+    /// does not wait until a reply arrives.
     pub(super) fn before(
         &mut self,
         topic: usize,
@@ -137,7 +143,7 @@ impl Lockstep {
         if !answered && !pair.given_up && go_on() {
             let seconds = patience.as_secs_f64();
             log::warn!(
-                "{}: no answer within {seconds} s (`max_wait_s`); not waited for until one comes",
+                "{}: no reply within {seconds} s (`max_wait_s`); lockstep is off until one arrives",
                 pair.answers
             );
         }
@@ -145,17 +151,17 @@ impl Lockstep {
         *pair.awaited.lock() = stamp_of(next);
     }
 
-    /// Waits for the answers to the last messages.
+    /// Waits for the replies to the last messages.
     pub(super) fn finish(&self, patience: Duration, go_on: &mut dyn FnMut() -> bool) {
         for pair in self.0.values().filter(|pair| !pair.given_up) {
             if !pair.awaited.wait(patience, go_on) {
-                log::warn!("{}: the last message was not answered", pair.answers);
+                log::warn!("{}: no reply to the last message", pair.answers);
             }
         }
     }
 }
 
-/// The first publisher of a topic in another process.
+/// First publisher of a topic in another process.
 fn publisher_of(
     topic: &str,
     node: &Node,
@@ -173,7 +179,7 @@ fn publisher_of(
     }
 }
 
-/// As the publisher offers it.
+/// QoS offered by the publisher.
 fn qos_of(publisher: &RemotePublisher) -> Qos {
     match (publisher.reliability, publisher.durability) {
         (Reliability::BestEffort, _) => Qos::best_effort(DEPTH),
@@ -182,7 +188,7 @@ fn qos_of(publisher: &RemotePublisher) -> Qos {
     }
 }
 
-/// Seconds and nanoseconds of the stamp of a message that begins with a header, little-endian.
+/// Stamp (seconds and nanoseconds, little-endian) of a message that begins with a header.
 fn stamp_of(cdr: &[u8]) -> Option<[u8; 8]> {
     let is_little = cdr.get(1)? & 1 == 1;
     let fields = cdr.get(ENCAPSULATION_BYTES..)?.first_chunk::<8>()?;

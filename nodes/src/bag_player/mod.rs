@@ -1,4 +1,4 @@
-//! `bag_player`: a rosbag2 log on the topics that it was recorded from.
+//! `bag_player`: publishes a rosbag2 log on its recorded topics.
 
 mod controls;
 mod keyboard;
@@ -32,31 +32,31 @@ use playhead::Playhead;
 
 pub use parameters::declare;
 
-/// Name of the executable and of the node unless it is remapped.
+/// Default name of the node, and name of the executable.
 pub const NAME: &str = "bag_player";
 
-/// Largest depth of a publisher, as of parameters. A reliable one keeps what is not acknowledged, within 64 MiB, whatever
-/// its depth.
+/// Largest history depth of a publisher, as for parameters. A reliable publisher keeps unacknowledged samples up to
+/// 64 MiB, whatever its depth.
 const MAX_DEPTH: u64 = 10_000;
-/// Most messages for late joiners: those of `/rosout`, the deepest of ROS's own. They stay in memory.
+/// Limit of messages kept in memory for late joiners: the depth of `/rosout`, the largest in ROS.
 const MAX_KEPT: u64 = 1000;
 
-/// The end of a player.
+/// Result of a playback.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct PlayerReport {
-    /// Messages given to the publishers.
+    /// Messages passed to the publishers.
     pub messages: u64,
-    /// Messages that a publisher did not take: a subscriber has not acknowledged those before.
+    /// Messages skipped because a subscriber had not acknowledged earlier ones.
     pub failed: u64,
-    /// Messages that reliable subscribers had not acknowledged when they left, or at the end.
+    /// Messages not acknowledged by reliable subscribers, at the end or when they left.
     pub unacknowledged: u64,
-    /// Latest that a message was after its time, in ms.
+    /// Largest delay of a message, ms.
     pub latest_ms: u64,
-    /// True if all reliable readers acknowledged everything in time.
+    /// True if all reliable readers acknowledged all messages in time.
     pub acknowledged: bool,
 }
 
-/// Plays the log that the parameters name and returns at its end or after a signal.
+/// Plays the log given by the parameters and returns at its end or after a signal.
 pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError> {
     let args = RosArgs::parse(arguments)?;
     if answers_help(NAME, Some(parameters::declare), &args) {
@@ -80,7 +80,7 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
         report_file,
     } = Settings::from_params(params)?;
     if bag.is_empty() {
-        return Err("which log? Give it as `--ros-args -p bag:=DIRECTORY`".into());
+        return Err("no log is given: set `--ros-args -p bag:=DIRECTORY`".into());
     }
     let reader = BagReader::open(&PathBuf::from(&bag))?.past_cut();
     let span_ns = (reader.start_ns().unwrap_or(0), reader.end_ns().unwrap_or(0));
@@ -124,7 +124,7 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
             },
             now,
         ) = (read(params)?, read(&now)?);
-        // The change of another parameter must not undo a rate that a key or service asks for.
+        // Changing another parameter must not undo a rate set by a key or service.
         let (rate, changed) = (player.rate, player.rate != now.player.rate);
         let sent = changes.send(Box::new(move |playback| {
             playback.most_wait = max_wait;
@@ -137,14 +137,14 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     playback.wait_for(&waited, wait);
     playback.start_lockstep(&lockstep, &node, wait)?;
     if !(waited.is_empty() && lockstep.is_empty()) {
-        // We know them; they may need a moment to know us.
+        // Discovery is done on this side; peers may need more time.
         playback.settle(settle);
     }
     log::info!("playing {bag}");
     let result = playback.play();
     playback.flush();
     report::write(&report_file, &playback.report, &node.diagnostics())?;
-    // Sends the last answers, for which the servers must still be there.
+    // Sends the last replies, which need the servers.
     drop(runtime);
     drop(controls);
     result?;
@@ -155,7 +155,7 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
 }
 
 impl PlayerReport {
-    /// Words for what was not delivered, if anything.
+    /// Summary of undelivered messages, if any.
     fn losses(&self) -> Option<String> {
         let (failed, unacknowledged) = (self.failed, self.unacknowledged);
         (failed > 0 || unacknowledged > 0).then(|| {
@@ -166,7 +166,7 @@ impl PlayerReport {
     }
 }
 
-/// A publisher for each topic, with the QoS that was recorded unless a parameter says otherwise.
+/// Creates a publisher per topic, with the recorded QoS unless a parameter overrides it.
 fn open_topics(node: &Node, player: &Player) -> Result<Vec<RawPublisher>, NodeError> {
     let mut publishers = Vec::new();
     for topic in player.topics() {
@@ -179,7 +179,7 @@ fn open_topics(node: &Node, player: &Player) -> Result<Vec<RawPublisher>, NodeEr
     Ok(publishers)
 }
 
-/// Type hash that the bag notes, or that of its definition.
+/// Type hash recorded in the bag, or computed from the recorded definition.
 fn type_hash(topic: &TopicInfo) -> Option<String> {
     let text = topic.definition.as_deref();
     match topic.type_hash.as_str() {
@@ -188,9 +188,9 @@ fn type_hash(topic: &TopicInfo) -> Option<String> {
     }
 }
 
-/// One publisher in place of all that were recorded: the weakest of each policy, so that every
-/// reader of then finds it, and room for the last samples of all of them. Static transforms are offered as tf2
-/// publishes them, whatever the bag notes.
+/// QoS of one publisher that replaces all recorded ones: the weakest value of each policy, so that every
+/// recorded reader matches, and depth for the last samples of all. Static transforms use the QoS of tf2,
+/// regardless of the bag.
 fn offered(topic: &TopicInfo) -> Qos {
     let recorded = topic.offered_qos.as_slice();
     let is_static = topic.has_static_transforms();

@@ -1,4 +1,4 @@
-//! All parameters of the player.
+//! Parameters of the player.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -11,25 +11,25 @@ use lattice_runtime::params::{About, ParamError, Params};
 const ABOUT: &[About] = about! {
     "bag" fixed(START): "rosbag2 directory, or one mcap or db3 file.";
     "rate": "Log seconds per second.";
-    "start_offset_s" fixed(START): "Where to start, after the first message; latched messages before it are published first.";
-    "duration_s" fixed(START): "How much to play of the log; 0: to its end.";
+    "start_offset_s" fixed(START): "Start offset after the first message; latched messages before it are published first.";
+    "duration_s" fixed(START): "Duration to play of the log; 0: to its end.";
     "loop" fixed(START): "Whether to start again at the end.";
     "topics" fixed(START): "Topics to play; empty: all.";
     "exclude_topics" fixed(START): "Topics not to play.";
-    "clock_hz" fixed(START): "How often /clock is published; 0: never.";
+    "clock_hz" fixed(START): "Rate of /clock; 0: never.";
     "wait_for_subscribers" fixed(START): "Topics that must have a subscriber before the log starts.";
-    "lockstep" fixed(START): "Pairs of topics, a played one and that of its answers: each message waits for an answer with the stamp of the message before.";
-    "wait_timeout_s" fixed(START): "How long to wait for these subscribers and publishers.";
-    "settle_s" fixed(START): "How long to wait for them to know us.";
-    "start_paused" fixed(START): "Whether the log is held until a call of ~/resume or the space bar.";
-    "keyboard" fixed(START): "Whether keys of the terminal are taken: space pauses, arrows step and change the rate.";
+    "lockstep" fixed(START): "Pairs of topics, a played one and a reply topic: each message waits for a reply with the stamp of the message before.";
+    "wait_timeout_s" fixed(START): "Timeout of the wait for these subscribers and publishers.";
+    "settle_s" fixed(START): "Extra time for them to discover the player.";
+    "start_paused" fixed(START): "Whether the playback starts paused, until a call of ~/resume or the space bar.";
+    "keyboard" fixed(START): "Whether terminal keys are read: space pauses, arrows step and change the rate.";
     "strict" fixed(START): "Whether the exit status is 1 if messages were skipped or not acknowledged.";
-    "max_wait_s": "How long a subscriber that does not acknowledge is waited for; then its topic's messages are skipped and counted until it does. The same for an answer of lockstep.";
+    "max_wait_s": "Longest wait for a subscriber that does not acknowledge; after it, messages of the topic are skipped and counted until it does. Also the timeout of a lockstep reply.";
 };
 
 const START: &str = "the log is opened with it";
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub bag: String,
     pub player: PlayerOptions,
@@ -65,7 +65,7 @@ impl Settings {
     }
 }
 
-/// Times in a log that the player takes, seconds.
+/// Allowed times in a log, seconds.
 const SECONDS: RangeInclusive<f64> = 0.0..=1e9;
 
 fn player_options(params: &Params) -> Result<PlayerOptions, ParamError> {
@@ -83,13 +83,13 @@ fn player_options(params: &Params) -> Result<PlayerOptions, ParamError> {
     })
 }
 
-/// A time of up to a day.
+/// Reads a duration of up to a day.
 fn seconds(params: &Params, name: &str, default: f64) -> Result<Duration, ParamError> {
     let seconds = params.f64_in(name, default, 0.0..=86_400.0)?;
     Ok(Duration::from_secs_f64(seconds))
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

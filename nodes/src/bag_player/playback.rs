@@ -1,4 +1,4 @@
-//! Playback against the clock: what is due is published, and controls are obeyed between two messages and in every wait.
+//! Playback in real time: publishes due messages, and executes commands between messages and during waits.
 
 use std::mem;
 use std::rc::Rc;
@@ -20,58 +20,58 @@ use super::playhead::Playhead;
 use super::steps::Steps;
 use crate::start::NodeError;
 
-/// A player that is later than this goes on from there: what it missed would come in one burst, too fast
-/// for those who listen.
+/// Largest delay that is caught up. A later playback shifts its time base: a burst of delayed messages would
+/// overrun the subscribers.
 const MOST_LATE: Duration = Duration::from_secs(1);
-/// Time between two statements of the place in the log.
+/// Period of the diagnostic status.
 pub(super) const STATE_PERIOD: Duration = Duration::from_millis(500);
-/// Longest sleep between two looks at the shutdown flag, and between two times on `/clock` while held.
+/// Longest sleep between checks of the shutdown flag, and period of `/clock` while paused.
 pub(super) const NAP: Duration = Duration::from_millis(100);
 
-/// Longest part of a wait after which controls are obeyed: a call is answered within 100 ms.
+/// Longest wait between command checks: a call is replied to within 100 ms.
 pub(super) const SLICE: Duration = Duration::from_millis(20);
 
-/// The part of a delay by which all that follows is late too.
+/// Part of a delay that shifts the time base.
 fn not_made_up(late: Duration) -> Duration {
     if late <= MOST_LATE {
         return Duration::ZERO;
     }
-    log::warn!("{late:.1?} late; so is all that follows");
+    log::warn!("{late:.1?} late; the time base is shifted");
     late
 }
 
-/// A log being played.
+/// Playback of a log.
 pub(super) struct Playback {
     pub player: Player,
     pub controls: Rc<Controls>,
-    /// Messages that a call wants played while the log is held.
+    /// Messages requested by a call while paused.
     pub steps: Option<Steps>,
     /// First and last time of the log.
     pub span_ns: (i64, i64),
     pub topics: Vec<RawPublisher>,
-    /// Topics whose queue a subscriber holds up.
+    /// Topics whose queue is blocked by a subscriber.
     pub stuck: Vec<bool>,
-    /// Topics each message of which waits for an answer to the one before.
+    /// Topics in lockstep.
     pub lockstep: Lockstep,
-    /// Time that such a subscriber is waited for.
+    /// Longest wait for a blocking subscriber.
     pub most_wait: Duration,
     pub clock: Option<Publisher<Clock>>,
     pub head: Playhead,
     /// True after a call of `stop`.
     pub stopped: bool,
-    /// True once nothing more is played.
+    /// True after the last message.
     pub ended: bool,
     pub shutdown: Shutdown,
-    /// Those of the node, for its rate to be read.
+    /// Parameters of the node, which include its rate.
     pub params: Arc<Params>,
     pub diagnostics: Diagnostics,
-    /// Pace at which the state is stated.
+    /// Rate limit of the diagnostic status.
     pub pace: Throttle,
     pub report: PlayerReport,
 }
 
 impl Playback {
-    /// Plays to the end, a call of `stop` or a signal.
+    /// Plays until the end, a call of `stop` or a signal.
     pub(super) fn play(&mut self) -> Result<(), NodeError> {
         self.head.restart();
         let mut percent = 0;
@@ -98,7 +98,7 @@ impl Playback {
                 continue;
             }
             if is_held {
-                // Time stands, and those who have just come hear of it.
+                // The time is constant while paused; late joiners need it.
                 self.publish_clock(self.player.bag_time_ns(self.head.now_ns()));
                 continue;
             }
@@ -116,7 +116,7 @@ impl Playback {
         Ok(())
     }
 
-    /// Obeys the controls that wait; false once the log is to end.
+    /// Executes pending commands; false once the playback is to end.
     pub(super) fn obey(&mut self) -> bool {
         let controls = Rc::clone(&self.controls);
         while let Some(control) = controls.next(Duration::ZERO) {
@@ -125,7 +125,7 @@ impl Playback {
         !self.shutdown.is_requested() && !self.stopped
     }
 
-    /// Takes one step; false at the end.
+    /// Performs one step; false at the end.
     fn step(&mut self, late: Duration) -> Result<bool, NodeError> {
         match self.player.next()? {
             Step::Publish { topic, data } => {
@@ -134,13 +134,13 @@ impl Playback {
                 self.publish(topic, data);
             }
             Step::Clock(now_ns) => self.publish_clock(now_ns),
-            Step::Looped => log::info!("the log starts again"),
+            Step::Looped => log::info!("the log restarts"),
             Step::End => return Ok(false),
         }
         Ok(true)
     }
 
-    /// Holds the log, or goes on with it, which ends a call that plays messages of a held one.
+    /// Pauses or resumes; resuming ends a call that plays messages while paused.
     pub(super) fn hold(&mut self, held: bool) {
         if self.head.is_held() == held {
             return;
@@ -149,13 +149,13 @@ impl Playback {
             true => self.head.hold(),
             false => {
                 self.head.go_on();
-                // Now: the log may be held again before the next message.
+                // At once: the playback may be paused again before the next message.
                 if let Some(steps) = self.steps.take() {
                     steps.end();
                 }
             }
         }
-        log::info!("{}", if held { "paused" } else { "goes on" });
+        log::info!("{}", if held { "paused" } else { "resumed" });
     }
 
     pub(super) fn toggle(&mut self) {
@@ -166,7 +166,7 @@ impl Playback {
         self.stopped = true;
     }
 
-    /// Goes on at another rate, which the parameter then shows; false if that cannot be played.
+    /// Changes the rate and the parameter that shows it; false if the rate is out of range.
     pub(super) fn set_rate(&mut self, rate: f64) -> bool {
         let possible = self.change_rate(rate);
         if possible {
@@ -175,17 +175,17 @@ impl Playback {
         possible
     }
 
-    /// Goes on at another rate; false if that cannot be played.
+    /// Changes the rate; false if it is out of range.
     pub(super) fn change_rate(&mut self, rate: f64) -> bool {
         let possible = self.player.set_rate(self.head.now_ns(), rate);
         match possible {
             true => log::info!("rate {rate}"),
-            false => log::warn!("rate {rate} is refused; 0.001 to 1000 can be played"),
+            false => log::warn!("rate {rate} is outside 0.001..=1000"),
         }
         possible
     }
 
-    /// Goes on at another time of the log; false if it has none such.
+    /// Continues at another time of the log; false if it is outside the log.
     pub(super) fn seek(&mut self, bag_ns: i64) -> bool {
         let sought = self.player.seek(self.head.now_ns(), bag_ns);
         sought.unwrap_or_else(|error| {
@@ -194,8 +194,8 @@ impl Playback {
         })
     }
 
-    /// Plays a log that is held from an offset on, for a time or until one; false where it is not held, and
-    /// for an offset behind its end.
+    /// Plays a paused log from an offset, for a duration or until a time; false if it is not paused, or
+    /// if the offset is behind the end.
     pub(super) fn play_part(&mut self, part: &PlayRequest) -> bool {
         if !self.head.is_held() {
             return false;
@@ -215,8 +215,8 @@ impl Playback {
         found
     }
 
-    /// Plays the next messages of a log that is held. Their call is answered at once where it is not, at the end of
-    /// the log, and while such a call is obeyed.
+    /// Plays the next messages of a paused log. The call returns at once if the log is not paused, at its end,
+    /// and while another such call is executed.
     pub(super) fn play_steps(&mut self, steps: Steps) {
         if !self.head.is_held() || self.ended || self.steps.is_some() {
             steps.end();
@@ -252,7 +252,7 @@ impl Playback {
         }
     }
 
-    /// States the place in the log, for those who show it.
+    /// Publishes the playback position as a diagnostic status.
     fn diagnose(&self) {
         let (begin_ns, end_ns) = self.span_ns;
         let now_ns = self.player.bag_time_ns(self.head.now_ns());
@@ -275,7 +275,7 @@ impl Playback {
         self.diagnostics.set("log", level, message, values);
     }
 
-    /// Messages that reliable subscribers have not acknowledged, or had not when they left.
+    /// Messages not acknowledged by reliable subscribers, including subscribers that have left.
     pub(super) fn unacknowledged(&self) -> u64 {
         let each = self.topics.iter().map(RawPublisher::unacknowledged);
         each.fold(0, u64::saturating_add)
@@ -291,8 +291,8 @@ impl Playback {
         }
     }
 
-    /// Publishes a message, in lockstep when the one before is answered; a subscriber that does not acknowledge is
-    /// waited for once.
+    /// Publishes a message, in lockstep after the reply to the one before; waits once for a subscriber that
+    /// does not acknowledge.
     fn publish(&mut self, topic: usize, data: Vec<u8>) {
         let begin = Instant::now();
         let (mut lockstep, patience) = (mem::take(&mut self.lockstep), self.most_wait);
@@ -312,7 +312,7 @@ impl Playback {
                 log::warn!("{error}; skipped until its subscribers acknowledge");
             }
         } else if *stuck {
-            log::info!("{}: goes on", publisher.topic());
+            log::info!("{}: continues", publisher.topic());
         }
         *stuck = published.is_err();
     }

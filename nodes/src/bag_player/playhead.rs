@@ -1,8 +1,8 @@
-//! The time of a player.
+//! Clock of the playback.
 
 use std::time::{Duration, Instant};
 
-/// The player's own clock, which stands while the log is held.
+/// The player's clock, which stops while paused.
 pub(super) struct Playhead {
     pub(super) begin: Instant,
     held: Option<Instant>,
@@ -17,7 +17,7 @@ impl Playhead {
         }
     }
 
-    /// Begins anew, held or not as before.
+    /// Restarts the clock, paused or not as before.
     pub(super) fn restart(&mut self) {
         *self = Self::new(self.is_held());
     }
@@ -38,7 +38,7 @@ impl Playhead {
         let _ = self.held.get_or_insert_with(Instant::now);
     }
 
-    /// Stands still for a time that has passed.
+    /// Excludes a time that has passed from the clock.
     pub(super) fn stand(&mut self, passed: Duration) {
         if !self.is_held() {
             self.begin += passed;

@@ -1,15 +1,15 @@
-//! Messages played one by one while the player is paused, and the replies to the calls that asked for them.
+//! Messages played individually while paused, and the replies to the calls that requested them.
 
-/// Messages still to be played, of a call of `~/burst` or `~/play_next`.
+/// Pending messages of a call of `~/burst` or `~/play_next`.
 pub(super) struct Steps {
-    /// None: all.
+    /// `None`: all.
     left: Option<u64>,
     played: u64,
     answer: Box<dyn FnOnce(u64) + Send>,
 }
 
 impl Steps {
-    /// As many messages as `wanted`, all for none; `answer` is given how many there were.
+    /// Requests `wanted` messages, or all; `answer` receives their final number.
     pub(super) fn new(wanted: Option<u64>, answer: impl FnOnce(u64) + Send + 'static) -> Self {
         Self {
             left: wanted,
@@ -18,7 +18,7 @@ impl Steps {
         }
     }
 
-    /// Counts a message; gives what is left, which answers where that is nothing.
+    /// Counts a message; returns the rest, or replies if nothing is left.
     pub(super) fn played(mut self) -> Option<Self> {
         self.played += 1;
         self.left = self.left.map(|left| left.saturating_sub(1));
@@ -31,7 +31,7 @@ impl Steps {
         }
     }
 
-    /// Answers.
+    /// Replies.
     pub(super) fn end(self) {
         (self.answer)(self.played);
     }

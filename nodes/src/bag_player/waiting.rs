@@ -1,4 +1,4 @@
-//! Waits of the playback for subscribers, in which it obeys controls.
+//! Waits of the playback for subscribers, during which commands are executed.
 
 use std::mem;
 use std::thread;
@@ -10,13 +10,13 @@ use super::lockstep::Lockstep;
 use super::playback::{Playback, SLICE};
 use crate::start::NodeError;
 
-/// Time that what is queued at the end has to reach its readers.
+/// Flush timeout at the end.
 const FLUSH_TIME: Duration = Duration::from_secs(20);
-/// The same after a signal.
+/// Flush timeout after a signal.
 const HURRIED_FLUSH_TIME: Duration = Duration::from_secs(2);
 
 impl Playback {
-    /// Waits until each of these topics has a subscriber, or goes on without after the time.
+    /// Waits until each of these topics has a subscriber, or until the timeout.
     pub(super) fn wait_for(&mut self, names: &[String], timeout: Duration) {
         let deadline = Instant::now() + timeout;
         for index in 0..self.topics.len() {
@@ -27,7 +27,7 @@ impl Playback {
             };
             while self.is_unheard(index) && self.obey() {
                 if Instant::now() >= deadline {
-                    log::warn!("{name}: nobody listens, playing all the same");
+                    log::warn!("{name}: no subscriber, playing without one");
                     break;
                 }
                 thread::sleep(SLICE);
@@ -40,7 +40,7 @@ impl Playback {
         publisher.is_some_and(|publisher| publisher.subscriber_count() == 0)
     }
 
-    /// Lets this time pass, or less at the end of the process.
+    /// Waits for `time`, or until shutdown.
     pub(super) fn settle(&mut self, time: Duration) {
         let deadline = Instant::now() + time;
         while Instant::now() < deadline && self.obey() {
@@ -48,7 +48,7 @@ impl Playback {
         }
     }
 
-    /// Begins with the lockstep of pairs of topics.
+    /// Starts the lockstep of pairs of topics.
     pub(super) fn start_lockstep(
         &mut self,
         pairs: &[String],
@@ -61,7 +61,7 @@ impl Playback {
         Ok(())
     }
 
-    /// Waits until a topic has room for a message; a subscriber that does not acknowledge is waited for once.
+    /// Waits until a topic has room for a message; once per subscriber that does not acknowledge.
     pub(super) fn wait_for_room(&mut self, topic: usize, bytes: usize) {
         if self.stuck.get(topic).is_none_or(|stuck| *stuck) {
             return;
@@ -78,7 +78,7 @@ impl Playback {
         }
     }
 
-    /// Gives readers time to have everything.
+    /// Waits for acknowledgements at the end.
     pub(super) fn flush(&mut self) {
         self.ended = true;
         let deadline = |hurried| {
@@ -116,7 +116,7 @@ impl Playback {
             }
             if let Some(publisher) = self.topics.get(index).filter(|_| !acknowledged) {
                 self.report.acknowledged = false;
-                log::warn!("{}: not everything was acknowledged", publisher.topic());
+                log::warn!("{}: not all messages were acknowledged", publisher.topic());
             }
         }
         self.obey();

@@ -1,4 +1,4 @@
-//! Messages between the threads that hear them and the one that writes them, bounded in bytes.
+//! Queue, bounded in bytes, between the receiving threads and the writing one.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex};
@@ -7,16 +7,16 @@ use std::time::Duration;
 use lattice_bag::TopicSpec;
 use lattice_runtime::lock;
 
-/// Something for the bag.
+/// Item to be written.
 pub(super) enum Item {
-    /// The next topic; they count from 0.
+    /// The next topic; indices count from 0.
     Topic(TopicSpec),
     Message {
         topic: usize,
         log_time_ns: i64,
         data: Vec<u8>,
     },
-    /// A new storage file begins.
+    /// Starts a new storage file.
     Split,
 }
 
@@ -29,15 +29,15 @@ impl Item {
     }
 }
 
-/// Outcome of waiting for an item.
+/// Result of waiting for an item.
 pub(super) enum Next {
     Item(Item),
     Nothing,
-    /// There will be no more.
+    /// The queue is closed and empty.
     End,
 }
 
-/// The queue. What does not fit is lost, and counted.
+/// The queue. Items that do not fit are dropped and counted.
 pub(super) struct Cache {
     max_bytes: usize,
     state: Mutex<State>,
@@ -48,7 +48,7 @@ pub(super) struct Cache {
 struct State {
     items: VecDeque<Item>,
     bytes: usize,
-    /// Messages of each topic that did not fit.
+    /// Dropped messages of each topic.
     lost: Vec<u64>,
     closed: bool,
 }
@@ -62,7 +62,7 @@ impl Cache {
         }
     }
 
-    /// Takes an item; a message only if there is room for it. One finds room where nothing else is.
+    /// Adds an item; a message only if it fits. A single message always fits an empty queue.
     pub(super) fn push(&self, item: Item) {
         let mut state = lock(&self.state);
         let bytes = item.bytes();
@@ -84,7 +84,7 @@ impl Cache {
         self.changed.notify_one();
     }
 
-    /// The next item, waited for at most so long.
+    /// Waits up to `patience` for the next item.
     pub(super) fn next(&self, patience: Duration) -> Next {
         let waits = |state: &mut State| state.items.is_empty() && !state.closed;
         let waited = self
@@ -101,18 +101,18 @@ impl Cache {
         }
     }
 
-    /// Takes no more messages; what is in it can still be had.
+    /// Rejects further messages; queued ones can still be taken.
     pub(super) fn close(&self) {
         lock(&self.state).closed = true;
         self.changed.notify_all();
     }
 
-    /// Messages of a topic that did not fit.
+    /// Dropped messages of a topic.
     pub(super) fn lost(&self, topic: usize) -> u64 {
         lock(&self.state).lost.get(topic).copied().unwrap_or(0)
     }
 
-    /// Messages that did not fit.
+    /// Dropped messages.
     pub(super) fn all_lost(&self) -> u64 {
         lock(&self.state).lost.iter().sum()
     }

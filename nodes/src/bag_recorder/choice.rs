@@ -1,4 +1,4 @@
-//! Choice of topics by name, as `ros2 bag record` has it.
+//! Selection of topics by name, as in `ros2 bag record`.
 
 use regex::Regex;
 
@@ -9,18 +9,18 @@ pub struct Choice {
     pub topics: Vec<String>,
     /// True for every topic.
     pub all: bool,
-    /// Names of which a part is like this.
+    /// Pattern matched anywhere in a name.
     pub regex: Option<Regex>,
-    /// Full names that are left out.
+    /// Excluded full names.
     pub exclude: Vec<String>,
-    /// Names of which a part is like this are left out.
+    /// Pattern of excluded names, matched anywhere in a name.
     pub exclude_regex: Option<Regex>,
-    /// True for topics with a part that begins with `_` too, where they are not named.
+    /// True to include topics with a part that begins with `_`, even if not named.
     pub hidden: bool,
 }
 
 impl Choice {
-    /// True if a topic of this name is to be recorded.
+    /// True if a topic of this name is selected.
     pub fn wants(&self, topic: &str) -> bool {
         let is = |list: &[String]| list.iter().any(|name| name == topic);
         let like = |regex: &Option<Regex>| regex.as_ref().is_some_and(|r| r.is_match(topic));

@@ -1,4 +1,4 @@
-//! The services of rosbag2's recorder.
+//! Services of rosbag2's recorder.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -19,7 +19,7 @@ pub(super) fn serve(session: &Session) -> Result<Vec<Server>, RuntimeError> {
         let paused = Arc::clone(paused);
         move || {
             if paused.swap(hold, Relaxed) != hold {
-                log::info!("{}", if hold { "paused" } else { "goes on" });
+                log::info!("{}", if hold { "paused" } else { "resumed" });
             }
         }
     };
@@ -46,7 +46,7 @@ pub(super) fn serve(session: &Session) -> Result<Vec<Server>, RuntimeError> {
             cache.push(Item::Split);
             SplitBagfileResponse::default()
         })?,
-        // There is no mode of snapshots.
+        // Snapshot mode is not supported.
         node.service::<Snapshot>("~/snapshot", |_| SnapshotResponse { success: false })?,
     ])
 }

@@ -1,4 +1,4 @@
-//! Definitions of message types: ours, or those that ROS packages have installed.
+//! Message definitions: ours, or those of installed ROS packages.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -7,21 +7,21 @@ use std::path::{Path, PathBuf};
 
 use lattice_msgs::{definition_of, type_hash};
 
-/// Line between two definitions.
+/// Separator between two definitions.
 const SEPARATOR: &str =
     "================================================================================";
 
-/// Longer files are no definitions, bytes; so many make one definition at most.
+/// Limit of a definition file, and of a complete definition, bytes.
 const MAX_FILE_BYTES: u64 = 1 << 20;
 const MAX_PARTS: usize = 500;
 
-/// Folders with a folder for each package, as `/opt/ros/jazzy/share`.
+/// Folders with a subfolder per package, such as `/opt/ros/jazzy/share`.
 pub(super) struct Definitions {
     folders: Vec<PathBuf>,
 }
 
 impl Definitions {
-    /// The folders given, then those of `AMENT_PREFIX_PATH`.
+    /// The given folders, then those of `AMENT_PREFIX_PATH`.
     pub(super) fn new(folders: &[PathBuf]) -> Self {
         let prefixes = std::env::var_os("AMENT_PREFIX_PATH").unwrap_or_default();
         let shares = std::env::split_paths(&prefixes).map(|prefix| prefix.join("share"));
@@ -30,9 +30,9 @@ impl Definitions {
         }
     }
 
-    /// Definition with all that it depends on, and the type's hash; nothing where a part is missing.
+    /// Definition with all its dependencies, and the type hash; `None` if a part is missing.
     ///
-    /// `announced` is the hash of the publisher: a definition of another one is not the publisher's.
+    /// `announced` is the publisher's hash: a definition with another hash is not used.
     pub(super) fn of(&self, ros_type: &str, announced: Option<&str>) -> Option<(String, String)> {
         let found = definition_of(ros_type).into_iter();
         let found = found.chain(
@@ -46,7 +46,7 @@ impl Definitions {
     }
 }
 
-/// The definition from files below `folder`; parts in other folders are looked for among our own.
+/// Reads a definition from files below `folder`; dependencies of other packages are taken from our own.
 fn read(folder: &Path, ros_type: &str) -> Option<String> {
     let mut text = file(folder, ros_type)?;
     let mut parts = BTreeMap::new();
@@ -80,14 +80,14 @@ fn file(folder: &Path, ros_type: &str) -> Option<String> {
     Some(text)
 }
 
-/// A message of ours without what it depends on.
+/// One of our messages without its dependencies.
 fn own_text(ros_type: &str) -> Option<String> {
     let text = definition_of(ros_type)?;
     let own = text.split(SEPARATOR).next().unwrap_or_default();
     Some(own.to_owned())
 }
 
-/// Full names of the messages that the fields refer to.
+/// Full names of the messages that fields refer to.
 fn dependencies(text: &str, of: &str) -> BTreeSet<String> {
     let package = of.split('/').next().unwrap_or_default();
     let name = |line: &str| {
@@ -96,7 +96,7 @@ fn dependencies(text: &str, of: &str) -> BTreeSet<String> {
         let element = field.split(['[', '<']).next()?;
         let (package, name) = element.rsplit_once('/').unwrap_or((package, element));
         let package = package.split('/').next()?;
-        // Built-in types begin with a small letter.
+        // Built-in types begin with a lower case letter.
         let is_message = name.starts_with(|c: char| c.is_ascii_uppercase());
         is_message.then(|| format!("{package}/msg/{name}"))
     };

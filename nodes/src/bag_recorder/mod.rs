@@ -1,4 +1,4 @@
-//! `bag_recorder`: topics of any type as a rosbag2 log.
+//! `bag_recorder`: records topics of any type as a rosbag2 log.
 
 mod cache;
 mod choice;
@@ -28,62 +28,62 @@ use writing::Written;
 
 pub use choice::Choice;
 
-/// Name of the node unless it is remapped.
+/// Default name of the node.
 pub const NAME: &str = "bag_recorder";
 
-/// Time that discovery has where it is not to go on.
+/// Discovery time if discovery is off afterwards.
 const FIRST_LOOK: Duration = Duration::from_secs(3);
-/// Between two lines about the recording, and two about its losses.
+/// Period of status lines and of loss warnings.
 const STATUS_PERIOD: Duration = Duration::from_secs(1);
 
 /// Options of a recording.
 #[derive(Clone, Debug)]
 pub struct RecorderOptions {
-    /// Folder of the bag, which must not be there yet.
+    /// Folder of the bag, which must not exist.
     pub bag: PathBuf,
-    /// Kind of its files.
+    /// Storage format.
     pub storage: Storage,
     /// Splitting and compression.
     pub writer: WriterOptions,
-    /// Topics.
+    /// Topics to record.
     pub choice: Choice,
-    /// Folders with a folder for each package of messages.
+    /// Folders with a subfolder per message package.
     pub msg_paths: Vec<PathBuf>,
-    /// Most bytes of messages that wait to be written.
+    /// Limit of bytes that wait to be written.
     pub cache_bytes: usize,
-    /// Time after which it ends by itself.
+    /// Duration of the recording.
     pub duration: Option<Duration>,
-    /// False: only topics that are there at the begin.
+    /// False: only topics present at the start.
     pub discovery: bool,
-    /// Between two looks for topics.
+    /// Period of topic discovery.
     pub polling: Duration,
-    /// True: nothing is taken before `~/resume`.
+    /// True: nothing is recorded before `~/resume`.
     pub start_paused: bool,
 }
 
-/// A topic of a recording.
+/// Statistics of a recorded topic.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct RecordedTopic {
     /// Full name.
     pub name: String,
     /// Type.
     pub type_name: String,
-    /// Messages that came.
+    /// Received messages.
     pub heard: u64,
-    /// Messages that were sent and did not get here, or were too long.
+    /// Messages lost before reception, or too long.
     pub lost: u64,
-    /// Messages that found no room in the cache, or that no bag can hold.
+    /// Messages dropped at the cache, or not representable in a bag.
     pub not_written: u64,
 }
 
-/// Outcome of a recording.
+/// Result of a recording.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct RecorderReport {
     /// Messages in the bag.
     pub messages: u64,
-    /// Bytes of them.
+    /// Bytes of these messages.
     pub bytes: u64,
-    /// Seconds that it took.
+    /// Duration in seconds.
     pub seconds: f64,
     /// Topics.
     pub topics: Vec<RecordedTopic>,
@@ -143,7 +143,7 @@ pub fn run(options: RecorderOptions, args: RosArgs) -> Result<RecorderReport, No
     })
 }
 
-/// The line about the recording in a terminal, and warnings of losses anywhere.
+/// Status line in a terminal, and loss warnings.
 struct Status {
     begin: Instant,
     due: Instant,
@@ -173,7 +173,7 @@ impl Status {
         let lost = session.lost();
         if lost > self.lost {
             let more = lost - self.lost;
-            log::warn!("{more} messages lost in the last second, {lost} in all");
+            log::warn!("{more} messages lost in the last second, {lost} in total");
             self.lost = lost;
         }
         let (messages, bytes) = (written.messages.load(Relaxed), written.bytes.load(Relaxed));

@@ -1,19 +1,19 @@
-//! Quality of service of a recorded topic: what all its publishers can give, and how a bag notes theirs.
+//! QoS of a recorded topic: compatible with all its publishers, and as recorded in a bag.
 
 use lattice_bag::BagQos;
 use lattice_runtime::qos::{Durability, Qos, Reliability};
-use lattice_runtime::{Load, RemotePublisher};
+use lattice_runtime::{RemotePublisher, SubscriptionExecutor};
 
-/// Samples that wait in DDS: a burst of small ones, and not too much of 4 MB clouds.
+/// Queue depths in DDS: bursts of small messages, and a bounded number of 4 MB clouds.
 const SMALL_DEPTH: usize = 500;
 const LARGE_DEPTH: usize = 50;
 
-/// Depths that are noted of publishers; the samples of a latched one come all at once to one who joins late.
+/// Recorded depth of publishers; the samples of a latched one arrive together at a late joiner.
 const DEPTH: u64 = 100;
 const LATCHED_DEPTH: u64 = 500;
 
-/// The QoS of a subscription that hears all these publishers: reliable if all are, latched if all are.
-pub(super) fn subscription(publishers: &[&RemotePublisher], load: Load) -> Qos {
+/// QoS of a subscription that matches all these publishers: reliable if all are, latched if all are.
+pub(super) fn subscription(publishers: &[&RemotePublisher], executor: SubscriptionExecutor) -> Qos {
     let reliable = |p: &&RemotePublisher| p.reliability == Reliability::Reliable;
     let latched = |p: &&RemotePublisher| p.durability == Durability::TransientLocal;
     Qos {
@@ -25,15 +25,15 @@ pub(super) fn subscription(publishers: &[&RemotePublisher], load: Load) -> Qos {
             true => Durability::TransientLocal,
             false => Durability::Volatile,
         },
-        depth: match load {
-            Load::Small => SMALL_DEPTH,
-            Load::Large => LARGE_DEPTH,
+        depth: match executor {
+            SubscriptionExecutor::Shared => SMALL_DEPTH,
+            SubscriptionExecutor::Dedicated => LARGE_DEPTH,
         },
         kept: None,
     }
 }
 
-/// The QoS of a publisher as a bag notes it. Discovery does not tell the depth: a player needs enough.
+/// QoS of a publisher as recorded in a bag. Discovery does not give the depth: a player needs a sufficient one.
 pub(super) fn noted(publisher: &RemotePublisher) -> BagQos {
     let latched = publisher.durability == Durability::TransientLocal;
     BagQos {
@@ -59,7 +59,7 @@ mod tests {
         };
         let [latched, reliable, sensor] = [Qos::LATCHED, Qos::DEFAULT, Qos::SENSOR].map(publisher);
         let heard = |publishers: &[&RemotePublisher]| {
-            let qos = subscription(publishers, Load::Small);
+            let qos = subscription(publishers, SubscriptionExecutor::Shared);
             (qos.reliability, qos.durability)
         };
         type R = Reliability;

@@ -1,4 +1,4 @@
-//! A recording at work: which topics are heard, and what of them was lost.
+//! A running recording: its subscriptions and their losses.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use lattice_bag::TopicSpec;
 use lattice_runtime::qos::Durability;
-use lattice_runtime::{Load, Node, RemotePublisher, RuntimeError, Subscription};
+use lattice_runtime::{Node, RemotePublisher, RuntimeError, Subscription, SubscriptionExecutor};
 
 use super::RecordedTopic;
 use super::cache::{Cache, Item};
@@ -14,36 +14,36 @@ use super::choice::Choice;
 use super::definitions::Definitions;
 use super::offered;
 
-/// Topics of one recording, at most: as many as a file of MCAP has.
+/// Limit of topics per recording, that of an MCAP file.
 const MAX_TOPICS: usize = 65_000;
 
-/// Types of one topic that are told of, at most.
+/// Limit of warnings about types of one topic.
 const MAX_TYPES: usize = 16;
 
-/// Types whose messages are large: they are taken on threads of their own.
+/// Types with large messages, received on dedicated threads.
 const LARGE: [&str; 3] = [
     "sensor_msgs/msg/PointCloud2",
     "sensor_msgs/msg/Image",
     "sensor_msgs/msg/CompressedImage",
 ];
 
-/// Topics that are being recorded, by the order of their coming.
+/// Recorded topics in the order of their discovery.
 pub(super) struct Session {
     pub node: Node,
     pub choice: Choice,
     pub definitions: Definitions,
     pub cache: Arc<Cache>,
-    /// True while nothing is taken.
+    /// True while recording is paused.
     pub paused: Arc<AtomicBool>,
-    pub topics: Vec<Heard>,
-    /// Topics that were given to the cache, also such as could not be heard.
+    pub topics: Vec<RecordedSubscription>,
+    /// Topics passed to the cache, including failed subscriptions.
     places: usize,
-    /// Types of each name that is recorded or was refused, the recorded one first.
+    /// Types seen for each topic name, the recorded one first.
     seen: BTreeMap<String, Vec<String>>,
 }
 
-/// A topic that is heard.
-pub(super) struct Heard {
+/// A recorded topic.
+pub(super) struct RecordedSubscription {
     subscription: Subscription,
     ros_type: String,
     place: usize,
@@ -69,12 +69,12 @@ impl Session {
         }
     }
 
-    /// False before the first message on /clock where time is simulated.
+    /// False before the first message on /clock with simulated time.
     pub(super) fn has_time(&self) -> bool {
         self.node.clock().now_ns() > 0
     }
 
-    /// Begins to hear topics that have come.
+    /// Subscribes to newly discovered topics.
     pub(super) fn look(&mut self) {
         let has_time = self.has_time();
         let publishers = self.node.remote_publishers();
@@ -90,7 +90,7 @@ impl Session {
                 continue;
             }
             let is_new = !self.seen.contains_key(topic);
-            // Latched samples come once: not before there is a time to note them with.
+            // Latched samples are sent once, so subscribe only when there is a time to stamp them with.
             let latched = |p: &&RemotePublisher| p.durability == Durability::TransientLocal;
             if is_new && !has_time && publishers.iter().any(latched) {
                 continue;
@@ -105,7 +105,9 @@ impl Session {
                     continue;
                 }
                 if let Some(recorded) = types.first() {
-                    log::warn!("{topic}: {other} is not recorded, the topic is one of {recorded}");
+                    log::warn!(
+                        "{topic}: type {other} is not recorded; the topic is recorded as {recorded}"
+                    );
                 }
                 types.push(other.clone());
             }
@@ -130,7 +132,7 @@ impl Session {
         let defined = self.definitions.of(ros_type, announced);
         if defined.is_none() {
             log::warn!(
-                "{topic}: no definition of {ros_type} is known, it is recorded without one; name the folder \
+                "{topic}: no definition of {ros_type} is found, it is recorded without one; give the folder \
                  of its package's `share` with --msg-path"
             );
         }
@@ -139,7 +141,7 @@ impl Session {
         let (cache, paused, clock) = (self.cache.clone(), self.paused.clone(), self.node.clock());
         let handler = move |data: Vec<u8>| {
             let log_time_ns = clock.now_ns();
-            // With simulated time there is none before the first message on /clock.
+            // Simulated time is 0 before the first message on /clock.
             if !paused.load(Relaxed) && log_time_ns > 0 {
                 cache.push(Item::Message {
                     topic: place,
@@ -148,11 +150,11 @@ impl Session {
                 });
             }
         };
-        let load = match LARGE.contains(&ros_type) {
-            true => Load::Large,
-            false => Load::Small,
+        let executor = match LARGE.contains(&ros_type) {
+            true => SubscriptionExecutor::Dedicated,
+            false => SubscriptionExecutor::Shared,
         };
-        // First, so that the topic is in the bag before its messages.
+        // First, so that the topic precedes its messages in the bag.
         self.places += 1;
         self.cache.push(Item::Topic(TopicSpec {
             name: topic.to_owned(),
@@ -161,11 +163,11 @@ impl Session {
             definition: defined.map(|(text, _)| text),
             offered_qos: publishers.iter().map(|p| offered::noted(p)).collect(),
         }));
-        let qos = offered::subscription(publishers, load);
+        let qos = offered::subscription(publishers, executor);
         let heard = self
             .node
-            .subscribe_raw(topic, ros_type, qos, load, handler)?;
-        self.topics.push(Heard {
+            .subscribe_raw(topic, ros_type, qos, executor, handler)?;
+        self.topics.push(RecordedSubscription {
             subscription: heard,
             ros_type: ros_type.to_owned(),
             place,
@@ -174,9 +176,9 @@ impl Session {
         Ok(())
     }
 
-    /// Numbers of each topic, with its place.
+    /// Statistics of each topic, with its index.
     pub(super) fn report(&self) -> Vec<(usize, RecordedTopic)> {
-        let numbers = |topic: &Heard| RecordedTopic {
+        let numbers = |topic: &RecordedSubscription| RecordedTopic {
             name: topic.subscription.topic().to_owned(),
             type_name: topic.ros_type.clone(),
             heard: topic.subscription.received(),
@@ -187,7 +189,7 @@ impl Session {
         topics.map(|topic| (topic.place, numbers(topic))).collect()
     }
 
-    /// Messages that did not get here or found no room.
+    /// Messages lost before reception or dropped at the cache.
     pub(super) fn lost(&self) -> u64 {
         let lost = self.topics.iter().map(|topic| topic.subscription.lost());
         lost.fold(self.cache.all_lost(), u64::saturating_add)

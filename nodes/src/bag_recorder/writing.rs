@@ -1,4 +1,4 @@
-//! The thread that writes the bag.
+//! Thread that writes the bag.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -11,15 +11,15 @@ use lattice_runtime::{Shutdown, lock};
 
 use super::cache::{Cache, Item, Next};
 
-/// Time after which what was written survives a killed process.
+/// Flush period: messages older than this survive a killed process.
 const FLUSH_PERIOD: Duration = Duration::from_secs(1);
 
-/// Messages and bytes that are in the bag.
+/// Messages and bytes written.
 #[derive(Default)]
 pub(super) struct Written {
     pub messages: AtomicU64,
     pub bytes: AtomicU64,
-    /// Messages of each topic that no bag can hold.
+    /// Messages of each topic that are not representable in a bag.
     pub refused: Mutex<BTreeMap<usize, u64>>,
 }
 
@@ -29,7 +29,7 @@ impl Written {
     }
 }
 
-/// Writes all that comes until the cache is closed. An error ends the recording.
+/// Writes all items until the cache is closed. An error ends the recording.
 pub(super) fn spawn(
     bag: BagWriter,
     cache: Arc<Cache>,
@@ -39,7 +39,7 @@ pub(super) fn spawn(
     let thread = Builder::new().name("write bag".to_owned());
     thread.spawn(move || {
         let result = write(bag, &cache, &written);
-        // Where it has failed nobody empties the cache any more.
+        // After a failure nothing empties the cache.
         cache.close();
         shutdown.request();
         result
@@ -48,7 +48,7 @@ pub(super) fn spawn(
 
 fn write(mut bag: BagWriter, cache: &Cache, written: &Written) -> Result<(), BagError> {
     let mut flushed = Instant::now();
-    // Nothing for a topic that no bag takes.
+    // `None` for a topic that cannot be recorded.
     let mut places: Vec<Option<usize>> = Vec::new();
     let mut is_dirty = false;
     loop {
@@ -70,9 +70,9 @@ fn write(mut bag: BagWriter, cache: &Cache, written: &Written) -> Result<(), Bag
                     continue;
                 };
                 match bag.write(place, log_time_ns, &data) {
-                    // No CDR, which nobody could read.
+                    // Not CDR, so not readable.
                     Err(error @ BagError::Invalid { .. }) => {
-                        log::warn!("left out: {error}");
+                        log::warn!("message not recorded: {error}");
                         written.refuse(topic);
                     }
                     wrote => {

@@ -1,16 +1,16 @@
-//! Lens distortion as OpenCV and ROS define it, and its inverse.
+//! Lens distortion models of OpenCV and ROS, and their inverse.
 
 use super::pinhole::CameraError;
 
-/// Steps of the inverse; a ray that needs more is outside the model.
+/// Iteration limit of the inverse; a ray that does not converge is outside the model.
 const MAX_STEPS: usize = 50;
-/// Accuracy of the inverse on the image plane at distance 1: a ten thousandth of a pixel.
+/// Convergence threshold of the inverse on the normalised image plane: a ten thousandth of a pixel.
 const ACCURACY: f64 = 1e-7;
 
-/// A model of distortion; places are x / z and y / z.
+/// Distortion model; image coordinates are x / z and y / z.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Distortion {
-    /// Straight rays.
+    /// No distortion.
     None,
     /// plumb_bob and rational_polynomial: k1, k2, p1, p2, k3, k4, k5, k6.
     Rational([f64; 8]),
@@ -19,7 +19,7 @@ pub enum Distortion {
 }
 
 impl Distortion {
-    /// The model of a name. Models whose parameters are all zero are straight, but for equidistant.
+    /// Model by its name. A model with zero parameters is `None`, except equidistant.
     pub fn new(model: &str, d: &[f64]) -> Result<Self, CameraError> {
         let parameters = |model, expected| CameraError::Parameters {
             model,
@@ -30,7 +30,7 @@ impl Distortion {
         let found = match model {
             "plumb_bob" if matches!(d.len(), 0 | 4 | 5) => Self::Rational(padded()),
             "plumb_bob" => return Err(parameters("plumb_bob", "none, 4 or 5")),
-            // OpenCV writes thin prisms and tilt behind them, as zeros where there are none.
+            // OpenCV appends thin prism and tilt parameters, zero if unused.
             "rational_polynomial"
                 if matches!(d.len(), 8 | 12 | 14) && d.iter().skip(8).all(|v| *v == 0.0) =>
             {
@@ -44,7 +44,7 @@ impl Distortion {
                 let four = <[f64; 4]>::try_from(d).map_err(|_| parameters("equidistant", "4"))?;
                 return Ok(Self::Equidistant(four));
             }
-            // Drivers of rectified cameras name none.
+            // Drivers of rectified cameras leave the name empty.
             "" if d.iter().all(|v| *v == 0.0) => Self::None,
             other => return Err(CameraError::Model(other.chars().take(32).collect())),
         };
@@ -54,7 +54,7 @@ impl Distortion {
         })
     }
 
-    /// Place where a ray is seen.
+    /// Distorted image point of a ray.
     pub fn distort(&self, ray: [f64; 2]) -> [f64; 2] {
         let [x, y] = ray;
         match self {
@@ -81,7 +81,7 @@ impl Distortion {
         }
     }
 
-    /// The ray that is seen at a place; `None` where the model has none.
+    /// Ray of a distorted image point; `None` outside the model.
     pub fn undistort(&self, seen: [f64; 2]) -> Option<[f64; 2]> {
         match self {
             Self::None => Some(seen),
@@ -97,8 +97,8 @@ impl Distortion {
         }
     }
 
-    /// Newton's method from the place itself, with steps halved while they lead away. Solutions behind the
-    /// fold of the polynomial, where the image is turned inside out, are none.
+    /// Newton's method from the point itself, with step halving. Solutions behind the
+    /// fold of the polynomial, where the image is inverted, are rejected.
     fn newton(&self, seen: [f64; 2]) -> Option<[f64; 2]> {
         let off = |ray: [f64; 2]| {
             let bent = self.distort(ray);
@@ -137,7 +137,7 @@ impl Distortion {
         (distance < ACCURACY).then_some(ray)
     }
 
-    /// Derivatives of `distort`, row by row, by central differences.
+    /// Jacobian of `distort`, row by row, by central differences.
     fn jacobian(&self, [x, y]: [f64; 2]) -> [f64; 4] {
         let h = 1e-6;
         let slope = |from: [f64; 2], to: [f64; 2]| {
@@ -150,14 +150,14 @@ impl Distortion {
     }
 }
 
-/// Angle under which a fisheye shows a ray that is this far from the axis, rad.
+/// Distorted angle of a fisheye for a ray at `angle_rad` from the axis, rad.
 fn bent_angle(k: &[f64; 4], angle_rad: f64) -> f64 {
     let a2 = angle_rad * angle_rad;
     angle_rad * (1.0 + a2 * (k[0] + a2 * (k[1] + a2 * (k[2] + a2 * k[3]))))
 }
 
-/// The inverse of [`bent_angle`] where it rises, by Newton's method; `None` from a right angle on, where
-/// a distance along the axis means nothing.
+/// Inverse of [`bent_angle`] on its rising part, by Newton's method; `None` from a right angle on, where
+/// a distance along the axis is undefined.
 fn angle_from_bent(k: &[f64; 4], bent_rad: f64) -> Option<f64> {
     let slope = |a: f64| {
         let a2 = a * a;

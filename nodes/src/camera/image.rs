@@ -1,21 +1,21 @@
-//! Pixels of an image whose header has been checked against its bytes.
+//! Image pixels, after validation of the header against the data length.
 
 use lattice_core::registration::UNLABELED;
 use lattice_msgs::sensor_msgs::Image;
 use thiserror::Error;
 
-/// Error of an image that cannot be read.
+/// Reason for rejecting an image.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ImageError {
-    /// An encoding that this topic does not take.
+    /// Unsupported encoding.
     #[error("encoding '{found}', expected {expected}")]
     Encoding {
-        /// Its first letters.
+        /// Encoding, shortened.
         found: String,
-        /// Those that are taken.
+        /// Supported encodings.
         expected: &'static str,
     },
-    /// More pixels than the parameter allows.
+    /// Pixel count above the limit.
     #[error("{width} x {height} pixels, more than `max_image_pixels` {max}")]
     TooLarge {
         /// Pixels in a row.
@@ -25,7 +25,7 @@ pub enum ImageError {
         /// The limit.
         max: usize,
     },
-    /// Nothing in it.
+    /// Empty image.
     #[error("{width} x {height} pixels: it is empty")]
     Empty {
         /// Pixels in a row.
@@ -33,32 +33,32 @@ pub enum ImageError {
         /// Rows.
         height: u32,
     },
-    /// Rows that overlap.
+    /// Row step shorter than a row.
     #[error("step {step}, but a row of {width} pixels has {row} bytes")]
     Step {
-        /// Bytes from row to row, as it says.
+        /// Row step as stated, bytes.
         step: u32,
         /// Pixels in a row.
         width: u32,
         /// Bytes of a row.
         row: u64,
     },
-    /// Fewer bytes than the header says.
+    /// Data shorter than stated.
     #[error("{found} bytes, but {height} rows with step {step} need {needed}")]
     Truncated {
-        /// Bytes there are.
+        /// Length of the data, bytes.
         found: usize,
         /// Rows.
         height: u32,
         /// Bytes from row to row.
         step: u32,
-        /// Bytes there must be.
+        /// Required length, bytes.
         needed: u64,
     },
 }
 
 impl ImageError {
-    /// Name under which it is counted.
+    /// Counter name.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Encoding { .. } => "encoding",
@@ -68,7 +68,7 @@ impl ImageError {
     }
 }
 
-/// Number that a pixel is.
+/// Pixel data type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pixel {
     /// mono8, 8UC1.
@@ -110,19 +110,19 @@ impl Pixel {
     }
 }
 
-/// True if the pixels of an encoding are colours, not grey.
+/// True for colour encodings.
 pub(super) fn is_colored(encoding: &str) -> bool {
     matches!(Pixel::of(encoding), Some(Pixel::Rgb(_) | Pixel::Bgr(_)))
 }
 
-/// Meaning of the pixels of an image.
+/// Meaning of the pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     /// Distances along the optical axis: 16UC1 in mm, 32FC1 in m.
     Depth,
     /// Class numbers: mono8, 8UC1, mono16, 16UC1, 32SC1.
     Labels,
-    /// From 0 to 1 in 32FC1, to the largest number in mono8, 8UC1, mono16, 16UC1.
+    /// Confidences: 0 to 1 in 32FC1, 0 to the largest number in mono8, 8UC1, mono16, 16UC1.
     Confidence,
     /// Colours: rgb8, bgr8, rgba8, bgra8, 8UC3, 8UC4, or grey: mono8, 8UC1.
     Colors,
@@ -154,14 +154,14 @@ impl Content {
     }
 }
 
-/// An image in which every pixel can be read.
+/// Validated image.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageView<'a> {
     /// Pixels in a row, at least 1.
     pub width: usize,
     /// Rows, at least 1.
     pub height: usize,
-    /// Number that a pixel is.
+    /// Pixel data type.
     pub pixel: Pixel,
     step: usize,
     is_bigendian: bool,
@@ -169,7 +169,7 @@ pub struct ImageView<'a> {
 }
 
 impl<'a> ImageView<'a> {
-    /// Checks encoding, size, step and length, in this order; allocates nothing for the pixels.
+    /// Validates encoding, size, step and length, in this order; allocates nothing for the pixels.
     pub fn new(image: &'a Image, content: Content, max_pixels: usize) -> Result<Self, ImageError> {
         let (pixels, expected) = content.encodings();
         let pixel = Pixel::of(&image.encoding).filter(|pixel| pixels.contains(pixel));
@@ -189,7 +189,7 @@ impl<'a> ImageView<'a> {
         if u64::from(step) < row {
             return Err(ImageError::Step { step, width, row });
         }
-        // The last row may end with its last pixel.
+        // The last row may have no padding.
         let needed = u64::from(step) * u64::from(height - 1) + row;
         if (image.data.len() as u64) < needed {
             return Err(ImageError::Truncated {
@@ -209,14 +209,14 @@ impl<'a> ImageView<'a> {
         })
     }
 
-    /// Bytes of a row; none beyond the last.
+    /// Bytes of a row; empty beyond the last.
     fn row(&self, row: usize) -> &'a [u8] {
         let begin = row.saturating_mul(self.step);
         let end = begin.saturating_add(self.width * self.pixel.bytes());
         self.data.get(begin..end).unwrap_or_default()
     }
 
-    /// Numbers of a row in order.
+    /// Values of a row in order.
     fn numbers<const N: usize, T>(
         &self,
         row: usize,
@@ -233,7 +233,7 @@ impl<'a> ImageView<'a> {
         })
     }
 
-    /// Depths of a row in m; NaN where there is none: 0, negative, infinite.
+    /// Depths of a row in m; NaN for missing values: 0, negative, infinite.
     pub fn depths_m(&self, row: usize, out: &mut Vec<f32>) {
         let valid = |z_m: f32| {
             if z_m > 0.0 && z_m < f32::INFINITY {
@@ -251,7 +251,7 @@ impl<'a> ImageView<'a> {
         }
     }
 
-    /// Classes of a row; `UNLABELED`: the largest number of the encoding, or none from 0 to 65534.
+    /// Classes of a row. `UNLABELED`: the largest number of the encoding, or a number outside 0..=65534.
     pub fn classes(&self, row: usize, out: &mut Vec<u16>) {
         match self.pixel {
             Pixel::U8 => out.extend(self.numbers(row, u8::from_le_bytes).map(
@@ -268,7 +268,7 @@ impl<'a> ImageView<'a> {
         }
     }
 
-    /// Confidences of a row, 0 to 1; 0 where it is no number.
+    /// Confidences of a row, 0 to 1; 0 for NaN.
     pub fn confidences(&self, row: usize, out: &mut Vec<f32>) {
         match self.pixel {
             Pixel::U8 => out.extend(self.row(row).iter().map(|v| f32::from(*v) / 255.0)),

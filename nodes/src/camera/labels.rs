@@ -1,4 +1,4 @@
-//! Classes of pixels: which numbers mean what, and images of labels read at the pixels of another.
+//! Pixel classes: mapping of label numbers, and label images sampled at the pixels of another image.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -12,14 +12,14 @@ use super::palette;
 use crate::convert::semantic::{Color, palette_from_params};
 use lattice_runtime::params::{ParamError, Params};
 
-/// Classes that say nothing, and those that count as others.
+/// Ignored classes and class groups.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ClassRules {
-    /// Classes that say nothing.
+    /// Classes treated as unlabelled.
     pub ignored: BTreeSet<u16>,
-    /// Class that others count as.
+    /// Group of each class, if any.
     pub groups: BTreeMap<u16, u16>,
-    /// Class of a colour, for masks of colours.
+    /// Class of each colour, for colour masks.
     pub palette: BTreeMap<Color, u16>,
 }
 
@@ -37,12 +37,12 @@ impl ClassRules {
         })
     }
 
-    /// A label image as numbers: a mask of colours becomes one by the palette.
+    /// Label image with class numbers; the palette converts a colour mask.
     pub fn numbered(&self, image: Arc<Image>, max_pixels: usize) -> Result<Arc<Image>, ImageError> {
         palette::numbered(image, &self.palette, max_pixels)
     }
 
-    /// Class of a point by the number of its pixel.
+    /// Class of a point from its label number.
     pub fn class_of(&self, number: u16) -> u16 {
         match self.ignored.contains(&number) {
             true => UNLABELED,
@@ -76,17 +76,17 @@ fn groups(params: &Params) -> Result<BTreeMap<u16, u16>, ParamError> {
     })
 }
 
-/// Meaning of the numbers in label images.
+/// Mapping of label numbers to classes.
 #[derive(Clone, Debug)]
 pub struct Classes {
-    /// Class of a point by the number of its pixel; all 65536.
+    /// Class of each label number; all 65536.
     class_of: Vec<u16>,
-    /// Labels of less confidence are none.
+    /// Labels of lower confidence are dropped.
     min_confidence: f32,
 }
 
 impl Classes {
-    /// Classes by rules, of any confidence.
+    /// Mapping by rules, for any confidence.
     pub fn new(rules: &ClassRules) -> Self {
         Self {
             class_of: class_table(rules),
@@ -94,17 +94,17 @@ impl Classes {
         }
     }
 
-    /// Goes on with other rules.
+    /// Replaces the rules.
     pub fn set_rules(&mut self, rules: &ClassRules) {
         self.class_of = class_table(rules);
     }
 
-    /// Takes the threshold of a LabelInfo: labels of less confidence are none.
+    /// Sets the threshold of a LabelInfo: labels of lower confidence are dropped.
     pub fn set_threshold(&mut self, threshold: f32) {
         self.min_confidence = if threshold.is_nan() { 0.0 } else { threshold };
     }
 
-    /// Class of a pixel by its number and confidence; `None`: it says nothing.
+    /// Class from label number and confidence; `None`: unlabelled.
     pub fn known(&self, number: u16, confidence: f32) -> Option<u16> {
         let class = self.class_of.get(usize::from(number)).copied();
         class.filter(|class| *class != UNLABELED && confidence >= self.min_confidence)
@@ -115,7 +115,7 @@ fn class_table(rules: &ClassRules) -> Vec<u16> {
     (0..=u16::MAX).map(|class| rules.class_of(class)).collect()
 }
 
-/// Rows of an image, read at the columns of another by nearest neighbour.
+/// Rows of an image, sampled at the columns of another by nearest neighbour.
 pub struct Sampled<'a, T> {
     view: ImageView<'a>,
     read: fn(&ImageView<'a>, usize, &mut Vec<T>),
@@ -124,13 +124,13 @@ pub struct Sampled<'a, T> {
     numbers: Vec<T>,
 }
 
-/// Place in `to` pixels under the centre of a pixel of `from`.
+/// Pixel of `to` under the centre of pixel `at` of `from`.
 pub(super) fn nearest(at: usize, from: usize, to: usize) -> usize {
     (2 * at + 1) * to / (2 * from)
 }
 
 impl<'a, T: Copy> Sampled<'a, T> {
-    /// An image to be read at the columns of another, `width` pixels wide.
+    /// Sampler of an image at the columns of another, `width` pixels wide.
     pub fn new(
         view: ImageView<'a>,
         width: usize,
@@ -147,7 +147,7 @@ impl<'a, T: Copy> Sampled<'a, T> {
         }
     }
 
-    /// Goes to a row of the other image, which has `height` of them.
+    /// Selects the row for a row of the other image of `height` rows.
     pub fn seek(&mut self, row: usize, height: usize) {
         let row = nearest(row, height, self.view.height);
         if self.row != Some(row) {
@@ -157,7 +157,7 @@ impl<'a, T: Copy> Sampled<'a, T> {
         }
     }
 
-    /// The number at a column of the other image.
+    /// Value at a column of the other image.
     pub fn at(&self, column: usize) -> Option<T> {
         self.numbers.get(*self.columns.get(column)?).copied()
     }

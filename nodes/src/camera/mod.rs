@@ -1,4 +1,4 @@
-//! Cameras and their images as messages: rays of pixels, images whose bytes were checked, labels.
+//! Cameras and images as messages: pixel rays, validated images, labels.
 
 mod distortion;
 mod image;

@@ -1,4 +1,4 @@
-//! Masks of colours as images of class numbers.
+//! Conversion of colour masks to images of class numbers.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,8 +9,8 @@ use lattice_msgs::sensor_msgs::Image;
 use super::image::{Content, ImageError, ImageView, is_colored};
 use crate::convert::semantic::Color;
 
-/// A label image as it is, or if it is a mask of colours as 16UC1: colours that are not in the palette
-/// are no class. Without a palette masks stay as they are.
+/// Label image unchanged, or a colour mask converted to 16UC1: colours outside the palette
+/// are unlabelled. Without a palette masks are unchanged.
 pub fn numbered(
     image: Arc<Image>,
     palette: &BTreeMap<Color, u16>,

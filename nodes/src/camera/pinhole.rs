@@ -1,45 +1,45 @@
-//! Rays of the pixels of a calibrated camera.
+//! Pixel rays of a calibrated camera.
 
 use lattice_msgs::sensor_msgs::CameraInfo;
 use thiserror::Error;
 
 use super::distortion::Distortion;
 
-/// Error of a camera that cannot be used.
+/// Reason for rejecting a camera.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum CameraError {
-    /// No calibration in it.
+    /// Uncalibrated camera.
     #[error("its matrix {matrix} has no focal lengths: the camera is not calibrated")]
     NotCalibrated {
         /// `k`, or `p` of a rectified image.
         matrix: &'static str,
     },
-    /// A model that is not known.
+    /// Unknown distortion model.
     #[error(
         "distortion model '{0}', expected plumb_bob, rational_polynomial or equidistant; \
          `rectified: true` if the images are rectified"
     )]
     Model(String),
-    /// A number of parameters that the model does not have.
+    /// Wrong number of distortion parameters.
     #[error("{found} parameters of {model}, expected {expected}")]
     Parameters {
         /// The model.
         model: &'static str,
-        /// Parameters there are.
+        /// Number of parameters given.
         found: usize,
-        /// Numbers there may be.
+        /// Allowed numbers.
         expected: &'static str,
     },
     /// NaN or infinite.
     #[error("its numbers are not all finite")]
     NotFinite,
-    /// An image that is not the whole one.
+    /// Binned image or region of interest.
     #[error("its image is binned or cut: send a camera_info of the image as it is")]
     Cut,
 }
 
 impl CameraError {
-    /// Name under which it is counted.
+    /// Counter name.
     pub fn name(&self) -> &'static str {
         match self {
             Self::NotCalibrated { .. } => "not_calibrated",
@@ -63,7 +63,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Reads a camera: of rectified images `p`, else `k` and `d`.
+    /// Camera from its message: `p` for rectified images, else `k` and `d`.
     pub fn new(info: &CameraInfo, rectified: bool) -> Result<Self, CameraError> {
         let roi = &info.roi;
         let part = (roi.width, roi.height);
@@ -97,26 +97,26 @@ impl Camera {
         })
     }
 
-    /// True if rays are bent by a lens.
+    /// True with lens distortion.
     pub fn is_distorted(&self) -> bool {
         self.distortion != Distortion::None
     }
 
-    /// The pixel of a point x, y, z in the optical frame; column and row of whole pixels are their centres.
+    /// Pixel of a point in the optical frame; integer columns and rows are pixel centres.
     pub fn project(&self, point_m: [f64; 3]) -> [f64; 2] {
         let [x, y, z] = point_m;
         let bent = self.distortion.distort([x / z, y / z]);
         [0, 1].map(|i| self.focal[i] * bent[i] + self.center[i])
     }
 
-    /// The ray of a pixel as x / z and y / z; `None` where no ray in front of the camera comes from.
+    /// Ray of a pixel as x / z and y / z; `None` outside the camera model.
     pub fn ray(&self, column: f64, row: f64) -> Option<[f64; 2]> {
         let place = [column, row];
         let bent = [0, 1].map(|i| (place[i] - self.center[i]) / self.focal[i]);
         self.distortion.undistort(bent)
     }
 
-    /// Rays of all pixels, row by row; NaN where there is none.
+    /// Rays of all pixels, row by row; NaN outside the camera model.
     pub fn rays(&self) -> Vec<[f32; 2]> {
         let rows = 0..self.height;
         let places = rows.flat_map(|row| (0..self.width).map(move |column| (column, row)));

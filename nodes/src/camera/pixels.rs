@@ -1,4 +1,4 @@
-//! Labels of one view with what came with them, read at the pixels of another image of the same view.
+//! Labels of one view with their companion images, sampled at the pixels of another image of the view.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use super::labels::{Classes, Sampled, nearest};
 use super::points::PointLayout;
 use super::soft::{SHARES, Share, SoftLabels};
 
-/// Labels of one time, with what is known beside them; each of any size.
+/// Labels of one stamp with their companion images; each of any size.
 #[derive(Clone, Debug)]
 pub struct LabelSet {
     /// Class numbers.
@@ -46,7 +46,7 @@ impl LabelSet {
         images + self.soft.as_ref().map_or(0, |soft| soft.bytes())
     }
 
-    /// Readers at the pixels of an image that is `width` pixels wide; `None` if an image cannot be read.
+    /// Sampler at the pixels of an image of `width` columns; `None` if an image is invalid.
     pub fn reader(&self, width: usize, max_pixels: usize) -> Option<PixelReader<'_>> {
         let view = |image, content| ImageView::new(image, content, max_pixels).ok();
         let labels = view(&self.labels, Content::Labels)?;
@@ -73,12 +73,12 @@ impl LabelSet {
     }
 }
 
-/// Label and colour of a pixel, as far as they are known.
+/// Label and colour of a pixel, where given.
 #[derive(Clone, Copy, Debug)]
 pub struct Pixel {
-    /// Its number in the label image.
+    /// Label number.
     pub number: u16,
-    /// Confidence of the class, 0 to 1; 1 where nobody says.
+    /// Confidence of the class, 0 to 1; 1 if not given.
     pub confidence: f32,
     /// Red, green and blue.
     pub color: [u8; 3],
@@ -87,7 +87,7 @@ pub struct Pixel {
 }
 
 impl Pixel {
-    /// Nothing.
+    /// Unlabelled pixel.
     pub const NONE: Self = Self {
         number: UNLABELED,
         confidence: 1.0,
@@ -95,7 +95,7 @@ impl Pixel {
         shares: [Share::NONE; SHARES],
     };
 
-    /// A class that is certain.
+    /// Pixel with a certain class.
     pub fn certain(number: u16) -> Self {
         Self {
             number,
@@ -104,7 +104,7 @@ impl Pixel {
     }
 }
 
-/// Readers of all that a [`LabelSet`] has, row by row.
+/// Samplers of all images of a [`LabelSet`], row by row.
 pub struct PixelReader<'a> {
     labels: Sampled<'a, u16>,
     confidence: Option<Sampled<'a, f32>>,
@@ -115,7 +115,7 @@ pub struct PixelReader<'a> {
 }
 
 impl PixelReader<'_> {
-    /// Layout of points that have all that is read.
+    /// Layout of points with all sampled fields.
     pub fn layout(&self, classes: &Classes) -> PointLayout {
         PointLayout {
             has_color: self.colors.is_some(),
@@ -124,7 +124,7 @@ impl PixelReader<'_> {
         }
     }
 
-    /// Goes to a row of the other image, which has `height` of them.
+    /// Selects the row for a row of the other image of `height` rows.
     pub fn seek(&mut self, row: usize, height: usize) {
         self.labels.seek(row, height);
         if let Some(confidence) = &mut self.confidence {
@@ -138,7 +138,7 @@ impl PixelReader<'_> {
         }
     }
 
-    /// The pixel at a column of the other image.
+    /// Pixel at a column of the other image.
     pub fn at(&self, column: usize) -> Pixel {
         let confidence = self.confidence.as_ref();
         let soft = self.soft.zip(self.columns.get(column));

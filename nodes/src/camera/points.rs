@@ -1,4 +1,4 @@
-//! Points with a class and what is known of it, as clouds have them.
+//! Labelled points in the layout of clouds.
 
 use lattice_core::registration::UNLABELED;
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
@@ -9,28 +9,28 @@ use super::pixels::Pixel;
 use crate::convert::cloud::{dense_cloud, field, xyz_fields};
 use crate::convert::viewpoint::VIEWPOINT_FIELDS;
 
-/// Most bytes of a cloud with probabilities; a larger one has none.
+/// Largest cloud with probabilities, bytes; a larger one has none.
 const MAX_BYTES: usize = 32 << 20;
 
-/// Fields of a cloud beside x, y, z, label and confidence.
+/// Optional fields of a cloud besides x, y, z, label and confidence.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PointLayout {
     /// True with the field `rgb`.
     pub has_color: bool,
-    /// Place of the camera in the frame of the cloud, m: in the fields `vp_x`, `vp_y`, `vp_z` of each point.
+    /// Camera position in the cloud's frame, m; written to `vp_x`, `vp_y`, `vp_z` of each point.
     pub viewpoint_m: Option<[f32; 3]>,
-    /// Elements of the field `label_probs`; 0: there is none.
+    /// Elements of the field `label_probs`; 0: no such field.
     pub classes: usize,
 }
 
 impl PointLayout {
-    /// Bytes of a point: x, y, z, rgb, confidence, viewpoint and probabilities in four bytes each, label in two.
+    /// Bytes per point: four for x, y, z, rgb, confidence, viewpoint and probabilities each, two for the label.
     fn step(self) -> usize {
         let viewpoint = 3 * usize::from(self.viewpoint_m.is_some());
         18 + 4 * (usize::from(self.has_color) + viewpoint + self.classes)
     }
 
-    /// The same without probabilities if so many points would need too much room.
+    /// The layout without probabilities if `points` points would exceed the limit.
     pub fn bounded(self, points: usize) -> Self {
         match points.saturating_mul(self.step()) <= MAX_BYTES {
             true => self,
@@ -49,7 +49,7 @@ pub struct LabelledPoints {
 }
 
 impl LabelledPoints {
-    /// No points, with room for some.
+    /// Empty records with capacity.
     pub fn new(layout: PointLayout, points: usize) -> Self {
         Self {
             layout,
@@ -59,7 +59,7 @@ impl LabelledPoints {
         }
     }
 
-    /// Adds the point that a pixel sees; without a class its confidence and probabilities are 0.
+    /// Adds the point of a pixel; without a class its confidence and probabilities are 0.
     pub fn push(&mut self, point_m: [f32; 3], pixel: &Pixel, classes: &Classes) {
         let class = classes.known(pixel.number, pixel.confidence);
         self.points += 1;
@@ -67,7 +67,7 @@ impl LabelledPoints {
         let label = class.unwrap_or(UNLABELED).to_le_bytes();
         let confidence = class.map_or(0.0, |_| pixel.confidence).to_le_bytes();
         let [x, y, z] = point_m.map(f32::to_le_bytes);
-        // As PCL has it: the bytes of a whole number in place of a float.
+        // As in PCL: the bytes of an integer in a float field.
         let [r, g, b] = pixel.color;
         let record: &[&[u8]] = match self.layout.has_color {
             true => &[&x, &y, &z, &[b, g, r, 0], &label, &confidence],
@@ -103,7 +103,7 @@ impl LabelledPoints {
         self.points
     }
 
-    /// Points of no known class.
+    /// Number of points without a class.
     pub fn unlabelled(&self) -> u64 {
         self.unlabelled
     }
@@ -118,8 +118,8 @@ impl LabelledPoints {
         self.points == 0
     }
 
-    /// The cloud with the fields x, y, z, rgb if there are colours, label, confidence, vp_x, vp_y, vp_z if there
-    /// is a viewpoint, and label_probs if there are probabilities.
+    /// The cloud with the fields x, y, z, optional rgb, label, confidence, optional vp_x, vp_y, vp_z, and
+    /// optional label_probs.
     pub fn cloud(self, header: Header) -> PointCloud2 {
         let mut fields = xyz_fields(PointField::FLOAT32, 4);
         let mut at = 12;

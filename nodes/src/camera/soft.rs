@@ -1,12 +1,12 @@
-//! Probabilities of the classes of pixels, of the best few.
+//! Class probabilities of pixels, limited to the most probable classes.
 
 use lattice_core::registration::UNLABELED;
 
 use super::labels::Classes;
 
-/// Classes that are kept of a pixel, as many as registration uses.
+/// Classes kept per pixel, as many as registration uses.
 pub const SHARES: usize = 4;
-/// Most elements of the probabilities of a point.
+/// Limit of probability elements per point.
 const MAX_ELEMENTS: usize = 256;
 
 /// A class of a pixel with its probability.
@@ -19,13 +19,13 @@ pub struct Share {
 }
 
 impl Share {
-    /// Nothing.
+    /// No class.
     pub const NONE: Self = Self {
         class: UNLABELED,
         parts: 0,
     };
 
-    /// A class with a probability from 0 to 1; what is no number is 0.
+    /// Class with a probability from 0 to 1; NaN counts as 0.
     pub fn new(class: u16, probability: f32) -> Self {
         Self {
             class,
@@ -33,26 +33,26 @@ impl Share {
         }
     }
 
-    /// From 0 to 1.
+    /// Probability, 0 to 1.
     pub fn probability(self) -> f32 {
         f32::from(self.parts) / 65535.0
     }
 }
 
-/// The best classes of each pixel of an image, row by row.
+/// Most probable classes of each pixel, row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SoftLabels {
     /// Pixels in a row.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Classes that there are.
+    /// Number of classes.
     classes: usize,
     pixels: Vec<[Share; SHARES]>,
 }
 
 impl SoftLabels {
-    /// Probabilities of an image; `None` if they are not as many as its pixels.
+    /// Probabilities of an image; `None` if their number does not match its pixels.
     pub fn new(
         [width, height]: [usize; 2],
         classes: usize,
@@ -67,7 +67,7 @@ impl SoftLabels {
         })
     }
 
-    /// Probabilities of no pixels.
+    /// Probabilities without pixels.
     #[cfg(test)]
     pub fn none(classes: usize) -> Self {
         Self {
@@ -78,7 +78,7 @@ impl SoftLabels {
         }
     }
 
-    /// Elements of a list that has one for each class that a point may have; 0: they are too many, or none.
+    /// Elements of a list with one per possible class; 0: none, or more than the limit.
     pub fn elements(&self, classes: &Classes) -> usize {
         let numbers = (0..=UNLABELED).take(self.classes);
         let known = numbers.filter_map(|number| classes.known(number, 1.0));
@@ -91,7 +91,7 @@ impl SoftLabels {
         size_of_val(self.pixels.as_slice())
     }
 
-    /// Those of a pixel.
+    /// Classes of a pixel.
     pub fn at(&self, column: usize, row: usize) -> [Share; SHARES] {
         let place = row.saturating_mul(self.width).saturating_add(column);
         let found = self.pixels.get(place).filter(|_| column < self.width);

@@ -1,4 +1,4 @@
-//! Results of calibrations as messages.
+//! Calibration results as messages.
 
 use lattice_core::registration::{Calibration, DirectionKind, Verdict};
 use lattice_msgs::calibration::{CalibrationResult, ClassReliability, WeakDirection};
@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix6};
 
 use super::geometry::transform_stamped;
 
-/// A verdict as the message has it.
+/// Message code of a verdict.
 pub fn verdict_code(verdict: Verdict) -> u8 {
     match verdict {
         Verdict::Ok => CalibrationResult::OK,
@@ -18,14 +18,14 @@ pub fn verdict_code(verdict: Verdict) -> u8 {
     }
 }
 
-/// Name of the verdict of a message; NONE if it has none.
+/// Name of a verdict code; NONE if unknown.
 pub fn verdict_name(code: u8) -> &'static str {
     let mut all = Verdict::ALL.into_iter();
     let found = all.find(|verdict| verdict_code(*verdict) == code);
     found.map_or("NONE", Verdict::name)
 }
 
-/// All that is known of a calibration itself; header, frames and counts are the caller's.
+/// Result message of a calibration; header, frames and counts are set by the caller.
 pub fn result_from(found: &Calibration) -> CalibrationResult {
     let weak = found.weak_directions.iter();
     let reliability = found.class_reliability.iter();
@@ -66,14 +66,14 @@ pub fn result_from(found: &Calibration) -> CalibrationResult {
     result
 }
 
-/// Puts a pose and its covariance into a result.
+/// Sets pose and covariance of a result.
 pub fn set_pose(
     result: &mut CalibrationResult,
     map_from_headset: &Isometry3<f64>,
     covariance: &Matrix6<f64>,
 ) {
     result.transform = transform_stamped("", "", 0, map_from_headset).transform;
-    // Symmetric, so that rows and columns are the same.
+    // The matrix is symmetric, so row and column order agree.
     result.covariance.copy_from_slice(covariance.as_slice());
 }
 

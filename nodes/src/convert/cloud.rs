@@ -1,4 +1,4 @@
-//! PointCloud2 and the core's clouds.
+//! Conversion between PointCloud2 and the core's clouds.
 
 pub use lattice_core::cloud::Precision;
 use lattice_core::cloud::{Cloud, CloudError, CloudLayout, CloudLimits, LayoutNote, PointField};
@@ -7,10 +7,10 @@ use lattice_msgs::std_msgs::Header;
 use nalgebra::Vector3;
 use serde_bytes::ByteBuf;
 
-/// Datums of clouds that carry f64 coordinates are multiples of this.
+/// Datums of clouds with f64 coordinates are multiples of this.
 const DATUM_TILE_M: f64 = 1024.0;
 
-/// Fields of a core's record as those of a message.
+/// Message fields of a core record.
 pub fn message_fields(fields: Vec<PointField>) -> Vec<sensor_msgs::PointField> {
     let field = |field: PointField| sensor_msgs::PointField {
         name: field.name,
@@ -21,12 +21,12 @@ pub fn message_fields(fields: Vec<PointField>) -> Vec<sensor_msgs::PointField> {
     fields.into_iter().map(field).collect()
 }
 
-/// The layout of a message, mended as its data allow. Nothing is believed until [`CloudLayout::view`].
+/// Layout of a message, corrected where its data allow it. It is unchecked until [`CloudLayout::view`].
 pub fn layout_of(cloud: &PointCloud2) -> CloudLayout {
     mended_layout_of(cloud).0
 }
 
-/// The same, with what was mended.
+/// Corrected layout, with notes on the corrections.
 pub fn mended_layout_of(cloud: &PointCloud2) -> (CloudLayout, Vec<LayoutNote>) {
     let field = |field: &sensor_msgs::PointField| PointField {
         name: field.name.clone(),
@@ -46,7 +46,7 @@ pub fn mended_layout_of(cloud: &PointCloud2) -> (CloudLayout, Vec<LayoutNote>) {
     (layout, notes)
 }
 
-/// Bytes that a cloud takes in memory, its fields included.
+/// Size of a cloud in memory, fields included.
 pub fn bytes_of(cloud: &PointCloud2) -> usize {
     let fields = cloud.fields.iter();
     let names: usize = fields
@@ -73,7 +73,7 @@ pub fn message_from_points(
     dense_cloud(header, fields, 3 * size, points_m.len(), data)
 }
 
-/// An unordered cloud of `points` rows of `point_step` bytes, little endian.
+/// Unordered cloud of `points` records of `point_step` bytes, little endian.
 pub fn dense_cloud(
     header: Header,
     fields: Vec<sensor_msgs::PointField>,
@@ -95,7 +95,7 @@ pub fn dense_cloud(
     }
 }
 
-/// Fields `x`, `y`, `z` one behind the other.
+/// Consecutive fields `x`, `y`, `z`.
 pub fn xyz_fields(datatype: u8, size: u32) -> Vec<sensor_msgs::PointField> {
     let places = [("x", 0), ("y", size), ("z", 2 * size)];
     places
@@ -103,7 +103,7 @@ pub fn xyz_fields(datatype: u8, size: u32) -> Vec<sensor_msgs::PointField> {
         .into()
 }
 
-/// A field of one element.
+/// Field of one element.
 pub fn field(name: &str, offset: u32, datatype: u8) -> sensor_msgs::PointField {
     sensor_msgs::PointField {
         name: name.to_owned(),
@@ -113,11 +113,11 @@ pub fn field(name: &str, offset: u32, datatype: u8) -> sensor_msgs::PointField {
     }
 }
 
-/// A cloud that is already in the map frame, as f32 offsets from a datum.
+/// Cloud in the map frame, as f32 offsets from a datum.
 ///
-/// f32 coordinates pass unchanged, with the datum zero. For f64 coordinates the datum is near the
-/// point that is nearest to `near_m` (the datum of the map), so that no stray point can cost the
-/// others their digits.
+/// f32 coordinates are unchanged, with a zero datum. For f64 coordinates the datum is near the
+/// point closest to `near_m` (the datum of the map), so that an outlier does not reduce the
+/// precision of the others.
 pub fn cloud_from_message(
     cloud: &PointCloud2,
     limits: &CloudLimits,

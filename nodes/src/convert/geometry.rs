@@ -1,24 +1,24 @@
-//! Poses and transforms.
+//! Conversion of poses and transforms.
 
 use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::geometry_msgs::{Point, Pose, Quaternion, Transform, TransformStamped, Vector3};
 use lattice_msgs::std_msgs::Header;
 use nalgebra::{Isometry3, Quaternion as NaQuaternion, Translation3, UnitQuaternion};
 
-/// A unit quaternion, or `None` when the four numbers are not finite or have no direction.
+/// Unit quaternion; `None` if it is not finite or zero.
 pub fn rotation_from(q: &Quaternion) -> Option<UnitQuaternion<f64>> {
     let raw = NaQuaternion::new(q.w, q.x, q.y, q.z);
     let norm = raw.norm();
     (norm.is_finite() && norm > 1e-6).then(|| UnitQuaternion::from_quaternion(raw))
 }
 
-/// A pose as an isometry, or `None` when a number is not finite or the rotation is zero.
+/// Pose as an isometry; `None` if it is not finite or the rotation is zero.
 pub fn isometry_from_pose(pose: &Pose) -> Option<Isometry3<f64>> {
     let p = &pose.position;
     isometry(p.x, p.y, p.z, &pose.orientation)
 }
 
-/// A transform as an isometry, or `None` when a number is not finite or the rotation is zero.
+/// Transform as an isometry; `None` if it is not finite or the rotation is zero.
 pub fn isometry_from_transform(transform: &Transform) -> Option<Isometry3<f64>> {
     let t = &transform.translation;
     isometry(t.x, t.y, t.z, &transform.rotation)
@@ -43,7 +43,7 @@ pub fn pose_from(isometry: &Isometry3<f64>) -> Pose {
     }
 }
 
-/// `parent_from_child` at a stamp, as tf wants it.
+/// `parent_from_child` at a stamp, as a tf message.
 pub fn transform_stamped(
     parent: &str,
     child: &str,

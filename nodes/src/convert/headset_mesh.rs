@@ -1,21 +1,21 @@
-//! Surfaces of a headset's mesh in the chunks in which they are sent.
+//! Chunking of headset mesh surfaces for transmission.
 
 use lattice_msgs::headset::HeadsetMesh;
 
-/// Most bytes of the arrays of a chunk, so that a message with its names has at most 60 kB.
+/// Limit of array bytes per chunk, so that a message with its names has at most 60 kB.
 const CHUNK_BYTES: usize = 56_000;
 
-/// Chunks that a surface is to be sent in: one, or as many as have at most 60 kB each.
+/// Number of chunks of a surface with at most 60 kB each.
 pub fn chunks_for(mesh: &HeadsetMesh) -> usize {
     let numbers = mesh.vertices.len() + mesh.triangles.len();
     match 4 * numbers + 2 * mesh.classes.len() {
         0..=CHUNK_BYTES => 1,
-        // Room for what each array is rounded up by.
+        // Reserve for rounding up each array.
         bytes => bytes.div_ceil(CHUNK_BYTES - 16),
     }
 }
 
-/// A whole surface in so many chunks, of which each has as much of every array; those behind its end are empty.
+/// Splits a surface into chunks with equal parts of every array; surplus chunks are empty.
 pub fn in_chunks(mesh: &HeadsetMesh, chunks: usize) -> Vec<HeadsetMesh> {
     let chunk = |i: usize| HeadsetMesh {
         header: mesh.header.clone(),
@@ -32,7 +32,7 @@ pub fn in_chunks(mesh: &HeadsetMesh, chunks: usize) -> Vec<HeadsetMesh> {
     (0..chunks).map(chunk).collect()
 }
 
-/// One of so many parts of an array that are as long as each other, but for the last.
+/// Part `i` of an array split into `parts` of equal length, except the last.
 fn part<T: Copy>(all: &[T], i: usize, parts: usize) -> Vec<T> {
     let length = all.len().div_ceil(parts).max(1);
     all.chunks(length).nth(i).unwrap_or_default().to_vec()

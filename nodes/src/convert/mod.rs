@@ -1,4 +1,4 @@
-//! Between messages and the core, without logic.
+//! Conversion between messages and the core, without logic.
 
 pub mod calibration;
 pub mod cloud;

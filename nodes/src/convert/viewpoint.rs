@@ -1,5 +1,5 @@
-//! Fields `vp_x`, `vp_y`, `vp_z` of a cloud: the place of the sensor when it saw the point, in the
-//! frame of the cloud. Rays from there are free space.
+//! Viewpoint fields `vp_x`, `vp_y`, `vp_z` of a cloud: the sensor position for each point, in the
+//! frame of the cloud. The ray from there to the point is free space.
 
 pub use lattice_core::cloud::VIEWPOINT_FIELDS;
 use lattice_core::cloud::{CloudError, CloudLimits, CloudView};
@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 use super::cloud::layout_of;
 
-/// The viewpoint of each point, NaN where it is not known; `None` if the cloud has no such fields.
+/// Viewpoint of each point, NaN if unknown; `None` if the cloud has no such fields.
 pub fn viewpoints_from_message(
     cloud: &PointCloud2,
     limits: &CloudLimits,
@@ -18,12 +18,12 @@ pub fn viewpoints_from_message(
     Ok(viewpoints(&view).map(Iterator::collect))
 }
 
-/// The one viewpoint of all points of a cloud, in its frame; `None` if it is not known, or moved by more than
+/// Common viewpoint of a cloud's points, in its frame; `None` if unknown, or if one differs by more than
 /// `max_moved_m` from that of the first point.
 pub fn viewpoint_of(view: &CloudView, max_moved_m: f64) -> Option<Vector3<f64>> {
     let mut all = viewpoints(view)?;
     let first = all.next()?;
-    // A distance from NaN is below no limit.
+    // False for NaN.
     let is_still = |v: Vector3<f64>| (v - first).norm() <= max_moved_m;
     (is_still(first) && all.all(is_still)).then_some(first)
 }

@@ -1,14 +1,14 @@
-//! Clocks of the clouds' topics while the clock of the poses is set.
+//! Clock steps of cloud topics relative to the poses.
 
-/// Most topics whose clocks are followed.
+/// Limit of tracked topics.
 const MAX_TOPICS: usize = 256;
 
-/// Relation of a cloud to the poses when it came.
+/// State of a cloud topic's clock when the cloud arrived.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CloudClock {
-    /// Steps ahead of the poses until then.
+    /// Forward steps of the poses until then.
     steps: u64,
-    /// True if the stamps of its topic have stepped back since the last of them.
+    /// True if the stamps of its topic have stepped back since the last step.
     is_set: bool,
 }
 
@@ -17,13 +17,13 @@ pub struct CloudClock {
 struct TopicClock {
     topic: String,
     last_ns: i64,
-    /// Steps ahead of the poses when the stamps last stepped back.
+    /// Forward steps of the poses at the last backward step of the stamps.
     set_at: Option<u64>,
-    /// Newest pose of the clock before, while this topic may still be stamped by that.
+    /// Newest pose of the previous clock, while this topic may still use it.
     before_ns: Option<i64>,
 }
 
-/// Stamps of all topics of clouds, and the number of steps ahead of the poses.
+/// Stamps of all cloud topics, and the number of forward steps of the poses.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CloudClocks {
     steps: u64,
@@ -31,13 +31,13 @@ pub(super) struct CloudClocks {
 }
 
 impl CloudClocks {
-    /// Counts a pose that is newer than all before.
+    /// Counts a pose newer than all before.
     pub fn on_step(&mut self) {
         self.steps = self.steps.wrapping_add(1);
     }
 
-    /// Takes the stamp of a cloud; `newest_ns` is that of the poses. `None` for a cloud of the clock before
-    /// that the poses have left.
+    /// Handles the stamp of a cloud; `newest_ns` is that of the poses. `None` for a cloud of a previous clock
+    /// whose poses are gone.
     pub fn on_cloud(
         &mut self,
         topic: &str,
@@ -71,12 +71,12 @@ impl CloudClocks {
         clock(known.set_at == Some(steps))
     }
 
-    /// True if a cloud may be of a clock that the poses do not show yet: the next pose tells.
+    /// True if a cloud may be of a new clock that the poses have not reached: the next pose decides.
     pub fn is_open(&self, clock: &CloudClock) -> bool {
         clock.is_set && clock.steps == self.steps
     }
 
-    /// Notes that the clock of the poses was set back, from `before_ns` on.
+    /// Handles a backward step of the poses' clock from `before_ns`.
     pub fn on_set_back(&mut self, before_ns: i64) {
         for topic in &mut self.topics {
             if topic.set_at != Some(self.steps) {

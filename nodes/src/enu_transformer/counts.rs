@@ -1,4 +1,4 @@
-//! Counters of the transformer, and its report at the end.
+//! Counters and final report of the transformer.
 
 use std::collections::BTreeMap;
 
@@ -7,92 +7,92 @@ use serde::{Deserialize, Serialize};
 use super::{CloudNote, Refusal, most_frequent};
 
 /// Counters of one transformer. Every cloud ends in exactly one of the `clouds_` counters
-/// other than `clouds_in`, or still waits.
+/// other than `clouds_in`, or is still queued.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TransformerCounts {
     /// Clouds received.
     pub clouds_in: u64,
     /// Clouds transformed and published.
     pub clouds_out: u64,
-    /// Dropped: the bytes are not what the header says, or no usable per-point time.
+    /// Dropped: the data do not match the header, or no per-point time is usable.
     pub clouds_malformed: u64,
-    /// Dropped: older than every pose at hand.
+    /// Dropped: older than all stored poses.
     pub clouds_before_poses: u64,
     /// Dropped: in a gap of the poses longer than `max_pose_gap_s`.
     pub clouds_pose_gap: u64,
-    /// Dropped: the pose that covers them did not come within `max_wait_s`.
+    /// Dropped: no covering pose within `max_wait_s`.
     pub clouds_pose_late: u64,
-    /// Dropped: the mount of their frame is unknown or its transforms do not cover them.
+    /// Dropped: the mount of their frame is unknown, or its transforms do not cover them.
     pub clouds_no_mount: u64,
-    /// Dropped: the waiting queue was full; the oldest goes.
+    /// Dropped: the oldest of a full queue.
     pub clouds_queue_full: u64,
-    /// Dropped: they waited when time jumped back.
+    /// Dropped: queued when time jumped back.
     pub clouds_time_jump: u64,
-    /// Points of the clouds published or published in part.
+    /// Points of published clouds before filtering.
     pub points_in: u64,
     /// Points published.
     pub points_out: u64,
-    /// Points left out: NaN or infinite.
+    /// Points rejected: NaN or infinite.
     pub points_not_finite: u64,
-    /// Points left out: nearer than `min_range_m` or farther than `max_range_m`.
+    /// Points rejected: nearer than `min_range_m` or farther than `max_range_m`.
     pub points_out_of_range: u64,
-    /// Points left out: without a time, though the cloud has times.
+    /// Points rejected: without a time in a cloud with times.
     pub points_no_time: u64,
-    /// Poses taken.
+    /// Poses accepted.
     pub poses_in: u64,
-    /// Poses refused: not finite or not a rotation.
+    /// Poses rejected: not finite or not a rotation.
     pub poses_invalid: u64,
-    /// Poses refused: the INS says that its solution is not good.
+    /// Poses rejected: the solution status of the INS is not good.
     pub poses_not_good: u64,
-    /// Poses refused: the transform of their frame, or of the frame that they are in, is not published.
+    /// Poses rejected: the transform of their body or reference frame is not published.
     #[serde(default)]
     pub poses_no_transform: u64,
-    /// Poses refused: of a stamp that came before, or older than the newest where no pose is missing.
+    /// Poses rejected: duplicate stamp, or older than the newest without a gap there.
     pub poses_out_of_order: u64,
-    /// Poses refused: of another time than those before, unless several in a row agree on it.
+    /// Poses rejected: stamp of another time, unless several in a row agree on it.
     #[serde(default)]
     pub poses_stamp_jump: u64,
-    /// Poses refused: the machine cannot have been there, by `ins.max_speed_m_per_s`.
+    /// Poses rejected: faster than `ins.max_speed_m_per_s`.
     #[serde(default)]
     pub poses_too_fast: u64,
-    /// Times that the poses jumped to another place and stayed there.
+    /// Accepted jumps of the poses to another place.
     #[serde(default)]
     pub place_jumps: u64,
-    /// Times that the stamps of the poses were set back (a log that loops).
+    /// Backward steps of the poses' stamps (a log that loops).
     pub time_jumps: u64,
-    /// Transforms of `/tf` and `/tf_static` refused.
+    /// Transforms of `/tf` and `/tf_static` rejected.
     pub transforms_refused: u64,
 }
 
-/// The end of an `enu_transformer`.
+/// Report of an `enu_transformer`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TransformerReport {
-    /// Everything counted by the state machine.
+    /// Counters of the state machine.
     pub counts: TransformerCounts,
-    /// Clouds that found the inbox, or the queue before it, full.
+    /// Clouds rejected by a full inbox or overrun before it.
     pub clouds_inbox_full: u64,
-    /// Clouds that were sent and did not come.
+    /// Clouds lost on the network.
     #[serde(default)]
     pub clouds_lost_on_network: u64,
-    /// Poses and transforms that found the inbox, or the queue before it, full.
+    /// Poses and transforms rejected by a full inbox or overrun before it.
     pub poses_inbox_full: u64,
-    /// Poses and transforms that were sent and did not come.
+    /// Poses and transforms lost on the network.
     #[serde(default)]
     pub poses_lost_on_network: u64,
-    /// Samples that did not decode.
+    /// Undecodable samples.
     pub undecodable: u64,
-    /// Clouds that could not be given to the publisher.
+    /// Clouds rejected by the publisher.
     pub clouds_not_published: u64,
-    /// Messages refused, by topic and reason, with value and remedy.
+    /// Rejected messages, by topic and reason, with value and remedy.
     #[serde(default)]
     pub refusals: Vec<Refusal>,
-    /// Notes on clouds read otherwise than declared, and on the source of the times of their points.
+    /// Notes on corrected clouds, and on the source of point times.
     #[serde(default)]
     pub notes: Vec<CloudNote>,
 }
 
 impl TransformerCounts {
-    /// Poses refused, for whichever reason.
+    /// Poses rejected for any reason.
     pub fn poses_refused(&self) -> u64 {
         self.poses_invalid
             + self.poses_not_good
@@ -102,7 +102,7 @@ impl TransformerCounts {
             + self.poses_too_fast
     }
 
-    /// Counts a pose by the reason of its refusal, or a jump of its place.
+    /// Counts a pose by the reason of its rejection, or a jump of its place.
     pub(super) fn add_pose(&mut self, reason: &str) {
         match reason {
             "poses_not_good" => self.poses_not_good += 1,
@@ -116,7 +116,7 @@ impl TransformerCounts {
 }
 
 impl TransformerReport {
-    /// Cause, in one line, of a map that stays empty; `None` while clouds come out.
+    /// One-line cause of an empty map; `None` once clouds are published.
     pub fn cause_of_nothing(&self) -> Option<String> {
         let counts = &self.counts;
         if counts.clouds_out > 0 {
@@ -134,14 +134,14 @@ impl TransformerReport {
                     format!("{poses} of {all} poses usable: {text}")
                 }
                 (_, Some(text)) => format!("0 of {} clouds usable: {text}", counts.clouds_in),
-                _ if counts.clouds_in == 0 => "no cloud came".to_owned(),
-                _ if poses == 0 => "no pose came".to_owned(),
-                _ => "all clouds wait for poses that cover them".to_owned(),
+                _ if counts.clouds_in == 0 => "no cloud was received".to_owned(),
+                _ if poses == 0 => "no pose was received".to_owned(),
+                _ => "all clouds are waiting for covering poses".to_owned(),
             },
         )
     }
 
-    /// Clouds lost by reason, zeros left out.
+    /// Dropped clouds by reason, without zeros.
     pub fn dropped(&self) -> BTreeMap<String, u64> {
         let counts = &self.counts;
         let reasons = [

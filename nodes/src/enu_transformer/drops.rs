@@ -1,4 +1,4 @@
-//! Clouds that are dropped: their reasons, counters and texts.
+//! Dropped clouds: reasons, counters and texts.
 
 use lattice_core::cloud::CloudError;
 use lattice_core::pose::{PoseMiss, TfMiss};
@@ -6,14 +6,14 @@ use lattice_core::pose::{PoseMiss, TfMiss};
 use super::EnuTransformer;
 use super::ins::InsSource;
 
-/// Reason for which a cloud was dropped.
+/// Reason for dropping a cloud.
 pub(super) enum Drop {
     Malformed(CloudError),
     BeforePoses {
         by_ns: i64,
     },
     PoseGap(PoseMiss),
-    /// Reason for which no pose covers it at the end of the wait; `None`: the input ended.
+    /// No covering pose at the end of the wait; `None`: the input ended.
     PoseLate(Option<PoseMiss>),
     NoMount {
         frame: String,
@@ -33,7 +33,7 @@ impl Drop {
 }
 
 impl EnuTransformer {
-    /// Counts a dropped cloud of a topic, with the text for its reason.
+    /// Counts a dropped cloud of a topic, with the text of its reason.
     pub(super) fn drop_cloud(&mut self, topic: &str, reason: &Drop) {
         let counts = &mut self.counts;
         let (counter, name) = match reason {
@@ -46,7 +46,7 @@ impl EnuTransformer {
             Drop::QueueFull => (&mut counts.clouds_queue_full, "clouds_queue_full"),
         };
         *counter += 1;
-        // The text needs all of the machine but the refusals.
+        // The text needs the rest of the machine.
         let mut refusals = std::mem::take(&mut self.refusals);
         let poses = refusals.most_frequent("poses_").cloned();
         refusals.add(topic, name, || {
@@ -56,7 +56,7 @@ impl EnuTransformer {
         self.refusals = refusals;
     }
 
-    /// Value, limit and remedy; `poses` is the most frequent reason for which poses were refused.
+    /// Text with value, limit and remedy; `poses` is the most frequent reason for rejected poses.
     fn text(&self, reason: &Drop, poses: Option<String>) -> String {
         let options = &self.options;
         let no_poses = self.counts.poses_in == 0;
@@ -107,7 +107,7 @@ impl EnuTransformer {
                 "no transform {map} <- {base} on /tf: set `map_frame` and `base_frame` to frames that tf connects, or `ins.source` to another source of poses"
             ),
             source => format!(
-                "no pose came; `ins.source` is {source}: see that its topic is published, or choose another"
+                "no pose was received; `ins.source` is {source}: check that its topic is published, or choose another"
             ),
         }
     }

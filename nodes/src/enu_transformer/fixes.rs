@@ -1,4 +1,4 @@
-//! Positions of a receiver paired with the attitudes of an Imu.
+//! Positions of a GNSS receiver paired with attitudes of an Imu.
 
 use std::collections::VecDeque;
 
@@ -10,14 +10,14 @@ use super::ins::{Body, BodyPose, InsOptions, InsRefusal};
 use super::speed_gate::{Placed, SpeedGate, TooFast};
 use super::stamp_order::{Refused, StampOrder};
 
-/// Most fixes that wait for the attitude at their stamp.
+/// Limit of fixes without attitude.
 const MAX_WAITING_FIXES: usize = 64;
-/// Most attitudes kept.
+/// Limit of stored attitudes.
 const MAX_ATTITUDES: usize = 4096;
 /// Time for which attitudes are kept beyond the longest gap between fixes, s.
 const MARGIN_S: f64 = 2.0;
 
-/// A position of the antenna.
+/// Position of the antenna.
 #[derive(Clone, Debug)]
 pub(super) struct Fix {
     pub stamp_ns: i64,
@@ -25,7 +25,7 @@ pub(super) struct Fix {
     pub antenna: Body,
 }
 
-/// An attitude against the local level (east, north, up).
+/// Attitude relative to the local level (east, north, up).
 #[derive(Clone, Debug)]
 pub(super) struct Attitude {
     pub stamp_ns: i64,
@@ -33,8 +33,8 @@ pub(super) struct Attitude {
     pub imu: Body,
 }
 
-/// Pairs fixes with the attitudes at their stamps, and gives each attitude between two fixes the
-/// position on the straight line between them.
+/// Pairs fixes with the attitudes at their stamps, and interpolates positions linearly at the stamps of
+/// attitudes between two fixes.
 pub(super) struct FixPairing {
     attitudes: PoseBuffer,
     attitude_order: StampOrder<Attitude>,
@@ -42,11 +42,11 @@ pub(super) struct FixPairing {
     speed: SpeedGate<Fix>,
     imu: Body,
     fixes: VecDeque<Fix>,
-    /// Stamp and position in the map of the last fix that was paired.
+    /// Stamp and map position of the last paired fix.
     last: Option<(i64, Vector3<f64>)>,
     max_imu_gap_ns: i64,
     max_fix_gap_ns: i64,
-    /// Fixes and attitudes refused since they were last asked for.
+    /// Rejected fixes and attitudes since the last query.
     refused: Vec<InsRefusal>,
 }
 
@@ -125,7 +125,7 @@ impl FixPairing {
         }
     }
 
-    /// Fixes and attitudes refused since the last call.
+    /// Rejected fixes and attitudes since the last call.
     pub fn take_refused(&mut self) -> Vec<InsRefusal> {
         std::mem::take(&mut self.refused)
     }
@@ -135,12 +135,12 @@ impl FixPairing {
             .extend(refused.iter().map(|stamp| InsRefusal::Stamp(*stamp)));
     }
 
-    /// Poses of the fixes whose attitude is known by now, and of the attitudes before them, in order.
+    /// Poses of paired fixes, and of the attitudes before them, in order.
     ///
-    /// The first fix makes the map frame where there is none.
+    /// The first fix defines the map frame if there is none.
     pub fn poses(&mut self, frame: &mut Option<EnuFrame>) -> Vec<BodyPose> {
         let mut poses = Vec::new();
-        // A fix of one clock has no attitude of another.
+        // Fixes and attitudes of different clocks are not paired.
         if self.fix_order.is_open() || self.attitude_order.is_open() {
             return poses;
         }

@@ -1,4 +1,4 @@
-//! From the messages of an INS to poses of the machine in the map.
+//! Machine poses in the map from INS messages.
 
 use std::fmt;
 use std::str::FromStr;
@@ -17,7 +17,7 @@ use super::fixes::{Attitude, Fix, FixPairing};
 pub use super::ins_refusal::InsRefusal;
 use crate::convert::geometry;
 
-/// Messages that carry the pose of the machine.
+/// Message type of the machine's poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InsSource {
     /// `novatel_oem7_msgs/INSPVA`: geodetic, ellipsoidal height.
@@ -30,9 +30,9 @@ pub enum InsSource {
     Odometry,
     /// `geometry_msgs/PoseStamped`.
     Pose,
-    /// `geometry_msgs/PoseWithCovarianceStamped`, as AMCL and NDT publish it.
+    /// `geometry_msgs/PoseWithCovarianceStamped`, as published by AMCL and NDT.
     PoseWithCovariance,
-    /// Transforms of `/tf` from the map to the machine, by way of any frames.
+    /// Transforms of `/tf` from the map to the machine, through any frames.
     Tf,
 }
 
@@ -47,7 +47,7 @@ impl InsSource {
         (Self::Tf, "tf"),
     ];
 
-    /// ROS types of its messages; the second one is paired with the first.
+    /// ROS types of its messages; the second is paired with the first.
     pub fn type_names(self) -> &'static [&'static str] {
         match self {
             Self::Inspva => &[INSPVA::TYPE],
@@ -75,21 +75,21 @@ impl FromStr for InsSource {
         let found = Self::ALL.iter().find(|(_, name)| *name == text);
         found.map(|(source, _)| *source).ok_or_else(|| {
             let names = Self::ALL.map(|(_, name)| name).join(", ");
-            format!("'{text}' is not a source, expected one of {names}")
+            format!("source '{text}' is not one of {names}")
         })
     }
 }
 
-/// Source of the stamp of a NovAtel pose.
+/// Stamp of a NovAtel pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InsStamp {
-    /// `header.stamp`, which in the ROS driver is the time of arrival.
+    /// `header.stamp`, the time of arrival in the ROS driver.
     Header,
-    /// GPS week and milliseconds of the log's own header.
+    /// GPS week and milliseconds of the log's header.
     Gps,
 }
 
-/// Surface that a NovAtel height is measured from.
+/// Reference surface of a NovAtel height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeightDatum {
     /// WGS84 ellipsoid.
@@ -98,63 +98,63 @@ pub enum HeightDatum {
     Geoid,
 }
 
-/// Options for reading an INS.
+/// Options of the INS decoder.
 #[derive(Clone, Debug)]
 pub struct InsOptions {
-    /// Messages to read.
+    /// Message type.
     pub source: InsSource,
     /// Stamp of NovAtel messages.
     pub stamp: InsStamp,
     /// GPS minus UTC.
     pub leap_seconds: i32,
-    /// Height of INSPVAX.
+    /// Height reference of INSPVAX.
     pub inspvax_height: HeightDatum,
-    /// Reference point of the INS in the frame of the machine, m; `None`: that of its frame on tf.
+    /// Lever arm: reference point of the INS in the machine's frame, m; `None`: from its frame on tf.
     pub lever_arm_m: Option<Vector3<f64>>,
-    /// Rotation of the INS in the frame of the machine; `None`: that of its frame on tf.
+    /// Boresight: rotation of the INS in the machine's frame; `None`: from its frame on tf.
     pub base_from_ins: Option<UnitQuaternion<f64>>,
     /// Frame of the machine: odometry of this frame needs no mount.
     pub base_frame: String,
     /// Origin of the map; `None`: the first good fix.
     pub origin: Option<Geodetic>,
-    /// Longest gap between two attitudes that a fix may fall into, in s.
+    /// Longest gap between two attitudes around a fix, s.
     pub max_imu_gap_s: f64,
-    /// Longest gap between two fixes over which positions are interpolated at the stamps of the
-    /// attitudes, in s.
+    /// Longest gap between two fixes for the interpolation of positions at the stamps of
+    /// attitudes, s.
     pub max_fix_gap_s: f64,
-    /// Speed beyond which positions are refused, in m/s.
+    /// Largest accepted speed, m/s.
     pub max_speed_m_per_s: f64,
-    /// Time for which positions are to agree on a place that could not be reached, in nanoseconds.
+    /// Time for which positions must agree on an unreachable place before it is accepted, ns.
     pub settle_ns: i64,
-    /// Step ahead of stamps beyond which three have to agree, in nanoseconds.
+    /// Forward step of stamps beyond which three must agree, ns.
     pub ahead_ns: i64,
 }
 
-/// One message of an INS.
+/// An INS message.
 #[derive(Clone, Copy, Debug)]
 pub enum InsMessage<'a> {
     /// NovAtel.
     Inspva(&'a INSPVA),
     /// NovAtel, extended.
     Inspvax(&'a INSPVAX),
-    /// Position, to be paired with [`InsMessage::Imu`].
+    /// Position, paired with [`InsMessage::Imu`].
     Fix(&'a NavSatFix),
     /// Attitude.
     Imu(&'a Imu),
-    /// Pose of its `child_frame_id` in the frame of its header.
+    /// Pose of its `child_frame_id` in the header's frame.
     Odometry(&'a Odometry),
-    /// Pose of the machine in the frame of its header.
+    /// Pose of the machine in the header's frame.
     Pose(&'a PoseStamped),
-    /// Pose of the machine in the frame of its header.
+    /// Pose of the machine in the header's frame.
     PoseWithCovariance(&'a PoseWithCovarianceStamped),
 }
 
-/// Frame whose position or attitude a message gives.
+/// Frame of the position or attitude in a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Body {
     /// The machine: no mount applies.
     Base,
-    /// An INS in this frame, without leading slash; empty where the message names none.
+    /// An INS in this frame, without leading slash; empty if the message names none.
     Ins(Arc<str>),
 }
 
@@ -164,22 +164,22 @@ impl Body {
     }
 }
 
-/// A pose as messages give it: its mount and the place of its reference frame are still to be applied.
+/// Pose from a message, before its mount and reference frame are applied.
 #[derive(Clone, Debug)]
 pub struct BodyPose {
     /// Nanoseconds since the Unix epoch.
     pub stamp_ns: i64,
-    /// Frame that the pose is in, without leading slash; `None`: the map frame.
+    /// Reference frame, without leading slash; `None`: the map frame.
     pub reference: Option<Arc<str>>,
     /// `reference_from_body`: position of the first body, attitude of the second; metres.
     pub pose: Isometry3<f64>,
-    /// Frame whose position it is.
+    /// Frame of the position.
     pub position_of: Body,
-    /// Frame whose attitude it is.
+    /// Frame of the attitude.
     pub attitude_of: Body,
 }
 
-/// Turns messages of an INS into poses of its frames.
+/// Converts INS messages to poses of its frames.
 pub struct InsDecoder {
     options: InsOptions,
     frame: Option<EnuFrame>,
@@ -187,7 +187,7 @@ pub struct InsDecoder {
 }
 
 impl InsDecoder {
-    /// A decoder that has seen nothing.
+    /// Decoder without input.
     pub fn new(options: InsOptions) -> Self {
         Self {
             frame: options.origin.map(EnuFrame::new),
@@ -196,18 +196,18 @@ impl InsDecoder {
         }
     }
 
-    /// Messages refused since the last call that were taken for a while.
+    /// Rejected messages since the last call that were held at first.
     pub(super) fn take_refused(&mut self) -> Vec<InsRefusal> {
         self.pairing.take_refused()
     }
 
-    /// The map frame on the earth, once known.
+    /// Map frame on the earth, once known.
     pub fn frame(&self) -> Option<&EnuFrame> {
         self.frame.as_ref()
     }
 
-    /// Poses that the message completes: mostly one, none for half a pair, several when an
-    /// attitude or a fix completes those before it.
+    /// Poses completed by the message: usually one, none for half a pair, several when an
+    /// attitude or a fix completes earlier ones.
     pub fn decode(&mut self, message: InsMessage) -> Result<Vec<BodyPose>, InsRefusal> {
         match message {
             InsMessage::Inspva(m) => {
@@ -314,7 +314,7 @@ impl InsDecoder {
     }
 
     fn on_imu(&mut self, imu: &Imu) -> Result<Vec<BodyPose>, InsRefusal> {
-        // REP 145: minus one says that there is no orientation.
+        // REP 145: -1 means no orientation.
         if imu.orientation_covariance[0] == -1.0 {
             return Err(InsRefusal::NoOrientation);
         }
@@ -328,7 +328,7 @@ impl InsDecoder {
     }
 }
 
-/// The pose of a body in the frame of a header.
+/// Pose of a body in the header's frame.
 fn one(header: &Header, pose: &Pose, body: Body) -> Result<Vec<BodyPose>, InsRefusal> {
     let reference = header.frame_id.trim_start_matches('/');
     Ok(vec![BodyPose {

@@ -1,44 +1,44 @@
-//! Reasons for which messages of an INS give no pose.
+//! Reasons for rejecting INS messages.
 
 use thiserror::Error;
 
 use super::speed_gate::TooFast;
 use super::stamp_order::Refused;
 
-/// Reason for which a message gave no pose.
+/// Reason for rejecting an INS message.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum InsRefusal {
-    /// The INS has no solution yet.
+    /// No INS solution.
     #[error(
         "INS status is {status}, expected 3 (INS_SOLUTION_GOOD), 6 (INS_SOLUTION_FREE) or 7 (INS_ALIGNMENT_COMPLETE)"
     )]
     NoSolution { status: u32 },
-    /// The receiver has no position.
+    /// No position fix.
     #[error("fix status is {status} ({}), expected 0 or more", fix_status(*status))]
     NoFix { status: i8 },
-    /// The Imu has no attitude.
+    /// No attitude.
     #[error(
         "orientation covariance is -1: the Imu has no orientation (REP 145); run an attitude filter such as imu_filter_madgwick, or choose another source of poses (`ins.source`)"
     )]
     NoOrientation,
-    /// Latitude, longitude or height.
+    /// Invalid latitude, longitude or height.
     #[error("{problem}")]
     Place { problem: String },
-    /// Latitude and longitude of a receiver that has none.
+    /// Zero latitude and longitude of a receiver without a position.
     #[error(
         "latitude and longitude are 0: the receiver has no position; for a place there set `origin.mode: fixed` and `origin.latitude_deg`, `origin.longitude_deg` near it"
     )]
     NullIsland,
-    /// A height that the message does not have.
+    /// Missing height.
     #[error(
         "altitude is NaN: the receiver gives no height (NavSatFix allows that); have the driver publish a 3D fix, or choose another source of poses (`ins.source`)"
     )]
     NoHeight,
-    /// A stamp of another time.
+    /// Stamp of another time.
     #[error("{}", stamp_text(.0))]
     Stamp(Refused),
-    /// A position that the machine cannot have reached.
+    /// Unreachable position.
     #[error(
         "position is {distance_m:.1} m from that {time_s:.3} s before, over {max_speed_m_per_s} m/s (`ins.max_speed_m_per_s`)"
     )]
@@ -47,18 +47,18 @@ pub enum InsRefusal {
         time_s: f64,
         max_speed_m_per_s: f64,
     },
-    /// Another place, on which positions have agreed.
+    /// Accepted jump to another place.
     #[error(
-        "position jumped by {distance_m:.1} m in {time_s:.3} s and stayed there: the map goes on there, beside what it has"
+        "position jumped by {distance_m:.1} m in {time_s:.3} s and stayed there: the map continues there, beside its earlier part"
     )]
     Jump { distance_m: f64, time_s: f64 },
-    /// Numbers of a pose.
+    /// Invalid pose.
     #[error("position is not finite, or the quaternion is zero or not finite")]
     Pose,
 }
 
 impl InsRefusal {
-    /// Counter of the reason.
+    /// Counter name.
     pub(super) fn reason(&self) -> &'static str {
         match self {
             Self::NoSolution { .. } | Self::NoFix { .. } | Self::NoOrientation => "poses_not_good",
@@ -70,7 +70,7 @@ impl InsRefusal {
         }
     }
 
-    /// A step of positions that is faster than `max_speed_m_per_s`.
+    /// Step of positions faster than `max_speed_m_per_s`.
     pub(super) fn too_fast(step: &TooFast, max_speed_m_per_s: f64) -> Self {
         Self::TooFast {
             distance_m: step.distance_m,
@@ -79,7 +79,7 @@ impl InsRefusal {
         }
     }
 
-    /// A step to a place that was believed.
+    /// Accepted step to another place.
     pub(super) fn jump(step: &TooFast) -> Self {
         Self::Jump {
             distance_m: step.distance_m,

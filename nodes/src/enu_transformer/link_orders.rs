@@ -1,17 +1,17 @@
-//! Order of moving transforms, link by link.
+//! Stamp order of dynamic transforms, per link.
 
 use nalgebra::Isometry3;
 use rustc_hash::FxHashMap;
 
 use super::stamp_order::{Decision, StampOrder};
 
-/// Most links whose order is followed; transforms of further ones are taken as they come.
+/// Limit of tracked links; transforms of further ones are accepted in any order.
 const MAX_LINKS: usize = 1000;
 
-/// Longest names kept, bytes: more than the buffer of transforms takes.
+/// Longest names kept, bytes: more than the transform buffer accepts.
 const MAX_NAME_BYTES: usize = 1024;
 
-/// Orders of the links from child to parent.
+/// Stamp orders of links from child to parent.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LinkOrders {
     by_child: FxHashMap<String, Vec<Link>>,
@@ -26,12 +26,12 @@ struct Link {
 }
 
 impl LinkOrders {
-    /// True while it is open for some link whether its clock was set by so little that stamps are alike.
+    /// True while an undecided clock step of some link is so small that stamps overlap.
     pub fn is_ambiguous(&self) -> bool {
         self.ambiguous > 0
     }
 
-    /// Takes a transform; `None` if it is to be taken as it is. With the newest stamp of the link before it.
+    /// Handles a transform and returns the decision with the previous newest stamp of its link; `None`: untracked.
     pub fn push(
         &mut self,
         parent: &str,
@@ -39,7 +39,7 @@ impl LinkOrders {
         stamp_ns: i64,
         parent_from_child: Isometry3<f64>,
     ) -> Option<(Decision<Isometry3<f64>>, Option<i64>)> {
-        // The buffer of transforms refuses such names.
+        // The transform buffer rejects such names.
         if parent.len().max(child.len()) > MAX_NAME_BYTES {
             return None;
         }
@@ -57,7 +57,7 @@ impl LinkOrders {
                 self.links += 1;
                 links.push(Link {
                     parent: parent.to_owned(),
-                    // A link may rest for as long as it likes.
+                    // A link may pause for any time.
                     order: StampOrder::new(i64::MAX),
                 });
                 links.len() - 1

@@ -1,4 +1,4 @@
-//! The transformer as a ROS node: a thin shell around [`EnuTransformer`].
+//! ROS node around [`EnuTransformer`].
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -22,8 +22,8 @@ use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    Clock, Diagnostics, Level, Load, Losses, Node, Publisher, Runtime, StaticTfBroadcaster,
-    Subscription, TfBroadcaster,
+    Clock, Diagnostics, Level, Losses, Node, Publisher, Runtime, StaticTfBroadcaster, Subscription,
+    SubscriptionExecutor, TfBroadcaster,
 };
 
 /// Event for the compute thread.
@@ -51,7 +51,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let source = settings.transformer.ins.source;
     let [lost, lost_poses] = [(); 2].map(|()| Arc::new(AtomicU64::new(0)));
     let (lost_clouds, losses) = (Losses::default(), Losses::default());
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         lost_clouds: lost_clouds.clone(),
         losses: losses.clone(),
         machine: EnuTransformer::new(settings.transformer),
@@ -70,7 +70,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         name,
         settings.limits,
         runtime.shutdown_handle(),
-        move |event| shell.on(event),
+        move |event| compute_state.on(event),
     )?;
     let inbox = compute.inbox();
     let mut clouds = Vec::new();
@@ -86,7 +86,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         let name: Arc<str> = topic.as_str().into();
         let event = move |cloud| Event::Cloud(Arc::clone(&name), cloud);
         let hand_over = inbox.counting(&lost, event, |cloud| cloud::bytes_of(cloud));
-        clouds.push(node.subscribe(&topic, Qos::SCANS, Load::Large, hand_over)?);
+        clouds.push(node.subscribe(
+            &topic,
+            Qos::SCANS,
+            SubscriptionExecutor::Dedicated,
+            hand_over,
+        )?);
     }
     lost_clouds.watch(&clouds);
     let is_raw = |topic: &str| !topic.ends_with("/points_enu") && !topic.ends_with("/map_centers");
@@ -103,7 +108,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     losses.watch(inputs.iter().chain(&clouds));
     let ticks = inbox.clone();
     let ticks = runtime.timer(Duration::from_millis(200), move || {
-        // A full inbox is busy enough to look at its queue anyway.
+        // A full inbox checks its queue anyway.
         let _ = ticks.send(Event::Tick, 0);
     });
     log::info!("{taken}");
@@ -118,7 +123,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// The inbox for poses and transforms, with the count of those that found it full.
+/// Inbox for poses and transforms, with the count of rejected ones.
 struct PoseInbox {
     inbox: Inbox<Event>,
     lost: Arc<AtomicU64>,
@@ -157,22 +162,22 @@ impl PoseInbox {
         qos: Qos,
         event: fn(Arc<M>) -> Event,
     ) -> Result<Subscription, NodeError> {
-        // Poses count no bytes: clouds must not keep them out.
+        // Poses count no bytes: clouds must not displace them.
         let (inbox, lost) = (self.inbox.clone(), Arc::clone(&self.lost));
         let warnings = Throttle::new(Duration::from_secs(5));
         let handler = move |message: Arc<M>| {
             if !inbox.send(event(message), 0) {
                 let all = lost.fetch_add(1, Ordering::Relaxed) + 1;
                 if warnings.check().is_some() {
-                    log::warn!("the inbox is full: {all} poses and transforms are lost so far");
+                    log::warn!("the inbox is full: {all} poses and transforms lost so far");
                 }
             }
         };
-        Ok(node.subscribe(topic, qos, Load::Small, handler)?)
+        Ok(node.subscribe(topic, qos, SubscriptionExecutor::Shared, handler)?)
     }
 }
 
-/// The topics that the node speaks on.
+/// Publishers of the node.
 struct Outputs {
     points: Publisher<PointCloud2>,
     tf: TfBroadcaster,
@@ -191,30 +196,30 @@ impl Outputs {
     }
 }
 
-/// Topics of the INS, for the texts of refusals.
+/// Topics of the INS, for rejection texts.
 struct InsTopics {
     ins: String,
     imu: String,
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     machine: EnuTransformer,
     outputs: Outputs,
     clock: Clock,
     diagnostics: Diagnostics,
-    /// Clouds that found the inbox full.
+    /// Clouds rejected by a full inbox.
     lost: Arc<AtomicU64>,
-    /// Losses before it: of clouds, and of all inputs.
+    /// Losses before the inbox: of clouds, and of all inputs.
     lost_clouds: Losses,
     losses: Losses,
-    /// Poses and transforms that found the inbox full.
+    /// Poses and transforms rejected by a full inbox.
     lost_poses: Arc<AtomicU64>,
     topics: InsTopics,
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         let now_ns = self.clock.now_ns();
         let machine = &mut self.machine;

@@ -1,4 +1,4 @@
-//! All parameters of the transformer.
+//! Parameters of the transformer.
 
 use super::TransformerOptions;
 use super::ins::InsSource;
@@ -10,49 +10,49 @@ use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
     "points_topics" fixed(TOPIC): "Topics of the sensors' clouds (sensor_msgs/PointCloud2); at least one.";
-    "ins.source" fixed(TOPIC): "inspva, inspvax, navsatfix_imu, odometry, pose, pose_with_covariance, or tf: transforms from map_frame to base_frame that others publish.";
+    "ins.source" fixed(TOPIC): "Source of poses: inspva, inspvax, navsatfix_imu, odometry, pose, pose_with_covariance, or tf (transforms from map_frame to base_frame by other nodes).";
     "ins.topic" fixed(TOPIC): "Topic of the INS; for navsatfix_imu that of the NavSatFix.";
     "ins.imu_topic" fixed(TOPIC): "Topic of the attitude, for navsatfix_imu.";
     "ins.stamp" fixed(POSES): "Stamp of NovAtel poses: gps (week and milliseconds of the log) or header (time of arrival).";
     "ins.leap_seconds" fixed(POSES): "GPS minus UTC, s.";
-    "ins.inspvax_height" fixed(POSES): "What the height of INSPVAX is measured from: geoid (its undulation is added) or ellipsoid.";
-    "ins.lever_arm_m" fixed(POSES): "Reference point of the INS in base_frame (x forward, y left, z up), in place of that of its frame on tf.";
-    "ins.boresight_rpy_rad" fixed(POSES): "Rotation of the INS in base_frame, fixed-axis roll, pitch, yaw, in place of that of its frame on tf.";
-    "ins.max_imu_gap_s" fixed(POSES): "Longest gap between two attitudes that a fix may fall into (navsatfix_imu).";
-    "ins.max_fix_gap_s" fixed(POSES): "Longest gap between two fixes over which positions are interpolated, at the stamps of the attitudes (navsatfix_imu); clouds wait that much longer.";
-    "ins.max_speed_m_per_s" fixed(POSES): "Poses farther from the one before than this speed allows, and 1 m, are refused until they have agreed on the new place for half of max_wait_s; 0: no limit. Not for tf.";
-    "origin.mode" fixed(POSES): "first_fix: the map frame begins where the first good fix is; fixed: at the place below.";
-    "origin.latitude_deg" fixed(POSES): "Latitude of that place, WGS84.";
-    "origin.longitude_deg" fixed(POSES): "Longitude of that place, WGS84.";
-    "origin.height_m" fixed(POSES): "Height of that place above the ellipsoid.";
-    "correction.translation_m" fixed(POSES): "Correction of all poses, in the map frame: moved by this after the rotation below.";
-    "correction.rpy_rad" fixed(POSES): "Its rotation about the origin of the map: fixed-axis roll, pitch, yaw.";
-    "map_frame" fixed(FRAME): "East-north-up frame of the map. If set, poses in another frame need a transform to it; else a frame that nothing connects with it is the map.";
+    "ins.inspvax_height" fixed(POSES): "Reference of the INSPVAX height: geoid (its undulation is added) or ellipsoid.";
+    "ins.lever_arm_m" fixed(POSES): "Lever arm: reference point of the INS in base_frame (x forward, y left, z up), in place of that of its frame on tf.";
+    "ins.boresight_rpy_rad" fixed(POSES): "Boresight: rotation of the INS in base_frame, fixed-axis roll, pitch, yaw, in place of that of its frame on tf.";
+    "ins.max_imu_gap_s" fixed(POSES): "Longest gap between two attitudes around a fix (navsatfix_imu).";
+    "ins.max_fix_gap_s" fixed(POSES): "Longest gap between two fixes for interpolating positions at the stamps of attitudes (navsatfix_imu); clouds wait that much longer.";
+    "ins.max_speed_m_per_s" fixed(POSES): "Largest speed: poses farther from the previous one than this speed and 1 m allow are rejected, until they have agreed on the new place for half of max_wait_s; 0: no limit. Not for tf.";
+    "origin.mode" fixed(POSES): "Origin of the map frame: first_fix (the first good fix) or fixed (the position below).";
+    "origin.latitude_deg" fixed(POSES): "Latitude of the fixed origin, WGS84.";
+    "origin.longitude_deg" fixed(POSES): "Longitude of the fixed origin, WGS84.";
+    "origin.height_m" fixed(POSES): "Height of the fixed origin above the ellipsoid.";
+    "correction.translation_m" fixed(POSES): "Translation of a correction of all poses in the map frame, applied after its rotation.";
+    "correction.rpy_rad" fixed(POSES): "Rotation of the correction about the origin of the map: fixed-axis roll, pitch, yaw.";
+    "map_frame" fixed(FRAME): "East-north-up frame of the map. If set, poses in another frame need a transform to it; otherwise an unconnected frame of poses is used as the map.";
     "base_frame" fixed(FRAME): "Frame of the machine.";
     "earth_frame" fixed(FRAME): "Frame of the earth (ECEF).";
-    "odom_frame" fixed(FRAME): "If set, map -> odom_frame is published instead of map -> base_frame.";
-    "publish_tf": "Whether to publish transforms at all.";
-    "min_range_m": "Points nearer to the sensor are left out.";
-    "max_range_m": "Points farther from the sensor are left out; 0: no limit.";
-    "max_cloud_points": "Clouds of more points are refused.";
-    "deskew": "Whether points are moved to where they were at their own time.";
+    "odom_frame" fixed(FRAME): "Odometry frame: if set, map -> odom_frame is published instead of map -> base_frame.";
+    "publish_tf": "Whether transforms are published.";
+    "min_range_m": "Points nearer to the sensor are rejected.";
+    "max_range_m": "Points farther from the sensor are rejected; 0: no limit.";
+    "max_cloud_points": "Limit of points per cloud; larger clouds are rejected.";
+    "deskew": "Whether points are motion-compensated by their own times.";
     "time.field": "Field of the time of points; empty: time, t, timestamp, offset_time, ts, stamp and the like, with or without a unit behind the name (_ns, _us, _ms, _s).";
     "time.unit": "auto, s, ms, us or ns.";
     "time.reference": "auto, stamp_start, stamp_end or absolute.";
-    "time.max_span_s": "Longest span of one cloud; a longer one is taken for a wrong unit and refused, single points farther from the others are left out.";
-    "max_wait_s": "How long a cloud waits for the pose that covers it.";
-    "max_pose_gap_s": "Longest gap between two poses that is interpolated.";
-    "pose_span_s" fixed(POSES): "How long poses and moving mounts are kept.";
-    "max_waiting_clouds": "Most clouds that wait; the oldest cloud goes.";
-    "max_waiting_bytes" fixed("the inbox is made with it"): "Most bytes of clouds that wait; the oldest cloud goes.";
-    "precision": "Coordinates of points_enu: auto, float32, or float64, which RViz does not draw. auto is float64 for clouds beyond 16 km from the origin, where float32 errs by more than 0.5 mm.";
-    "pass_fields": "Fields of the clouds that points_enu keeps where they have them, as they are.";
-    "viewpoints": "Whether points_enu says for each point where the sensor was (vp_x, vp_y, vp_z), 12 or 24 bytes more; free_space of lattice_mapper needs it.";
+    "time.max_span_s": "Longest time span of one cloud; a longer one indicates a wrong unit and is rejected, single outlying points are dropped.";
+    "max_wait_s": "Longest wait of a cloud for a covering pose.";
+    "max_pose_gap_s": "Longest gap between two poses for interpolation.";
+    "pose_span_s" fixed(POSES): "Duration for which poses and dynamic mounts are kept.";
+    "max_waiting_clouds": "Limit of queued clouds; the oldest cloud is dropped.";
+    "max_waiting_bytes" fixed("the inbox is made with it"): "Limit of queued cloud bytes; the oldest cloud is dropped.";
+    "precision": "Coordinate type of points_enu: auto, float32, or float64, which RViz does not draw. auto is float64 for clouds beyond 16 km from the origin, where the float32 error exceeds 0.5 mm.";
+    "pass_fields": "Fields of the input clouds copied to points_enu, if present.";
+    "viewpoints": "Whether points_enu contains the sensor position of each point (vp_x, vp_y, vp_z), 12 or 24 bytes more; free_space of lattice_mapper needs it.";
 };
 
 const POSES: &str = "poses are read and kept with it";
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub transformer: TransformerOptions,
     pub limits: ComputeLimits,
@@ -88,7 +88,7 @@ impl Settings {
 }
 
 impl Settings {
-    /// Topics and frames, for the log.
+    /// Topics and frames in use, for the log.
     pub(super) fn taken(&self) -> String {
         let options = &self.transformer;
         let (ins, imu) = (&self.ins_topic, &self.imu_topic);
@@ -107,7 +107,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

@@ -1,5 +1,5 @@
-//! From poses of the frames that messages name to poses of the machine in the map: mounts of the INS, and
-//! the frame that a pose is in.
+//! Machine poses in the map from poses of message frames: mounts of the INS, and
+//! reference frames.
 
 use std::sync::Arc;
 
@@ -10,28 +10,28 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use super::ins::{Body, BodyPose};
 use super::{EnuOutput, EnuTransformer};
 
-/// Most poses that wait for transforms.
+/// Limit of poses that wait for transforms.
 const MAX_WAITING_POSES: usize = 4096;
 
-/// A pose that waits for the transforms it needs.
+/// Pose that waits for its transforms.
 pub(super) struct WaitingPose {
     topic: Arc<str>,
     pose: BodyPose,
     arrived_ns: i64,
 }
 
-/// Relation of the frame that poses are in to the map frame.
+/// Relation of the poses' reference frame to the map frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reference {
-    /// Not known yet.
+    /// Undecided.
     Unknown,
-    /// Transforms connect it with the map frame.
+    /// Connected with the map frame by transforms.
     OnTf,
-    /// Nothing connects it with the map frame: it is the map frame.
+    /// Not connected with the map frame, so it is used as the map frame.
     IsMap,
 }
 
-/// A transform that a pose needs and that is not there.
+/// A missing transform of a pose.
 struct Missing {
     miss: TfMiss,
     of: MissingOf,
@@ -40,12 +40,12 @@ struct Missing {
 enum MissingOf {
     /// `base_frame` <- frame of the INS.
     Mount(Arc<str>),
-    /// `map_frame` <- frame that the pose is in.
+    /// `map_frame` <- reference frame of the pose.
     Reference(Arc<str>),
 }
 
 impl EnuTransformer {
-    /// Takes a pose of a frame; it counts when its transforms are known.
+    /// Handles a pose of a frame; it is used once its transforms are known.
     pub(super) fn on_body_pose(
         &mut self,
         topic: &str,
@@ -82,7 +82,7 @@ impl EnuTransformer {
         self.settle_poses(now_ns, out);
     }
 
-    /// Takes the waiting poses whose transforms are known by now, in the order in which they came.
+    /// Handles waiting poses whose transforms are known by now, in the order of arrival.
     pub(super) fn settle_poses(&mut self, now_ns: i64, out: &mut Vec<EnuOutput>) {
         while let Some(waiting) = self.waiting_poses.front() {
             let waited_s = now_ns.saturating_sub(waiting.arrived_ns) as f64 * 1e-9;
@@ -118,7 +118,7 @@ impl EnuTransformer {
         }
     }
 
-    /// Refuses all poses that still wait.
+    /// Rejects all waiting poses.
     pub(super) fn refuse_waiting_poses(&mut self) {
         while let Some(waiting) = self.waiting_poses.pop_front() {
             if let Err(missing) = self.resolve(&waiting.pose) {
@@ -127,7 +127,7 @@ impl EnuTransformer {
         }
     }
 
-    /// Says once if the frame that poses are in, which was taken for the map, is connected with it after all.
+    /// Warns once if the frame used as the map becomes connected with the map frame.
     pub(super) fn check_reference(&mut self) {
         let Some(frame) = &self.pose_frame else {
             return;
@@ -143,12 +143,12 @@ impl EnuTransformer {
         ) {
             self.has_warned_reference = true;
             log::warn!(
-                "a transform {map} <- {frame} is published now; poses are taken in {frame} as before: start again to map in {map}, or set map_frame: {frame}"
+                "a transform {map} <- {frame} is published now; poses remain in {frame}: restart to map in {map}, or set map_frame: {frame}"
             );
         }
     }
 
-    /// The pose of the machine in the map.
+    /// Pose of the machine in the map.
     fn resolve(&self, pose: &BodyPose) -> Result<StampedPose, Missing> {
         let stamp_ns = pose.stamp_ns;
         let map_from_reference = self.map_from_reference(pose)?;
@@ -173,7 +173,7 @@ impl EnuTransformer {
         })
     }
 
-    /// Place of a body on the machine at a stamp: by the parameter, else by tf.
+    /// Lever arm of a body at a stamp: from the parameter, else from tf.
     fn lever_arm_m(&self, body: &Body, stamp_ns: i64) -> Result<Vector3<f64>, Missing> {
         match (body, &self.options.ins.lever_arm_m) {
             (Body::Ins(_), Some(lever_arm_m)) => Ok(*lever_arm_m),
@@ -181,7 +181,7 @@ impl EnuTransformer {
         }
     }
 
-    /// Rotation of a body on the machine at a stamp: by the parameter, else by tf.
+    /// Rotation of a body on the machine at a stamp: from the parameter, else from tf.
     fn base_from_ins(&self, body: &Body, stamp_ns: i64) -> Result<UnitQuaternion<f64>, Missing> {
         match (body, &self.options.ins.base_from_ins) {
             (Body::Ins(_), Some(base_from_ins)) => Ok(*base_from_ins),
@@ -189,7 +189,7 @@ impl EnuTransformer {
         }
     }
 
-    /// The mount of a body on tf at a stamp.
+    /// Mount of a body on tf at a stamp.
     fn base_from_body(&self, body: &Body, stamp_ns: i64) -> Result<Isometry3<f64>, Missing> {
         let base = &self.options.base_frame;
         match body {
@@ -204,7 +204,7 @@ impl EnuTransformer {
         }
     }
 
-    /// Place of the frame that a pose is in; `None` if that is the map frame.
+    /// Pose of the reference frame in the map; `None` if it is the map frame.
     fn map_from_reference(&self, pose: &BodyPose) -> Result<Option<Isometry3<f64>>, Missing> {
         let map = &self.options.map_frame;
         let frame = match &pose.reference {
@@ -218,7 +218,7 @@ impl EnuTransformer {
         })
     }
 
-    /// True if nothing has ever connected the frame that poses are in with the map frame, which nobody asked for.
+    /// True if the poses' frame was never connected with a map frame that is not set by parameter.
     fn is_unconnected(&self, missing: &Missing) -> bool {
         let unconnected = matches!(
             missing.miss,
@@ -254,7 +254,7 @@ impl EnuTransformer {
     }
 }
 
-/// True if waiting may help.
+/// True if a later transform may cover the time.
 fn may_come(miss: &TfMiss) -> bool {
     matches!(
         miss,

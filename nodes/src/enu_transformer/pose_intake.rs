@@ -1,5 +1,5 @@
-//! From poses of the machine as they come to the poses that clouds are placed by: their order, their clock
-//! and their speed.
+//! Input filter of machine poses: order, clock
+//! and speed.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::stamp_order::Refused;
 use super::{Drop, EnuOutput, EnuTransformer};
 
 impl EnuTransformer {
-    /// Takes a pose of the machine in the map.
+    /// Handles a pose of the machine in the map.
     pub(super) fn on_pose(&mut self, topic: &str, mut pose: StampedPose, out: &mut Vec<EnuOutput>) {
         if let Some(correction) = &self.options.correction {
             pose.map_from_base = correction * pose.map_from_base;
@@ -48,7 +48,7 @@ impl EnuTransformer {
         }
     }
 
-    /// Ends the poses: what is held is refused.
+    /// Ends the poses: held ones are rejected.
     pub(super) fn finish_poses(&mut self) {
         let held = self.order.finish();
         let topic = Arc::clone(&self.pose_topic);
@@ -59,10 +59,10 @@ impl EnuTransformer {
         self.refuse_fast(&topic, &held);
     }
 
-    /// Takes a pose whose stamp is of the time of the others.
+    /// Handles a pose whose stamp is in order.
     fn on_ordered_pose(&mut self, topic: &str, pose: StampedPose, out: &mut Vec<EnuOutput>) {
         if self.options.ins.source == InsSource::NavsatfixImu {
-            // Fixes were held against each other before they were interpolated.
+            // Fixes were checked before their interpolation.
             self.keep_pose(topic, pose, out);
             return;
         }
@@ -74,7 +74,7 @@ impl EnuTransformer {
         self.refuse_fast(topic, &passed.refused);
         if let Some(step) = passed.jump {
             self.refuse_message(topic, &InsRefusal::jump(&step));
-            // Nothing was between the places.
+            // There is no path between the places.
             self.poses.clear();
         }
         for placed in passed.taken {
@@ -112,15 +112,15 @@ impl EnuTransformer {
         }
     }
 
-    /// Counts a message of the INS that was refused, with its text.
+    /// Counts a rejected INS message, with its text.
     pub(super) fn refuse_message(&mut self, topic: &str, refusal: &InsRefusal) {
         let reason = refusal.reason();
         self.counts.add_pose(reason);
         self.refusals.add(topic, reason, || refusal.to_string());
     }
 
-    /// The clock of the poses was set back from `before_ns` on: clouds of the time before are placed by what
-    /// there is of it, or go.
+    /// Handles a backward step of the poses' clock from `before_ns`: clouds of the time before are transformed by
+    /// the stored poses or dropped.
     pub(super) fn on_set_back(&mut self, before_ns: i64, out: &mut Vec<EnuOutput>) {
         self.counts.time_jumps += 1;
         let mut i = 0;

@@ -1,30 +1,30 @@
-//! Messages that were refused, by topic and reason, with a text for whoever runs the robot.
+//! Rejected messages by topic and reason, with a text for the operator.
 
 use serde::{Deserialize, Serialize};
 
-/// Most pairs of topic and reason that are kept apart.
+/// Limit of distinct pairs of topic and reason.
 const MAX_REFUSALS: usize = 64;
 
-/// Messages of a topic that were refused for one reason.
+/// Messages of a topic rejected for one reason.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refusal {
     /// Topic of the messages.
     pub topic: String,
     /// Counter of the reason, such as `clouds_no_mount`.
     pub reason: String,
-    /// Messages refused.
+    /// Number of rejected messages.
     pub count: u64,
-    /// Value, limit and remedy, of the last message for which it was written.
+    /// Value, limit and remedy of the last described message.
     pub text: String,
 }
 
-/// Refusals since the start.
+/// Rejections since the start.
 #[derive(Clone, Debug, Default)]
 pub struct Refusals(Vec<Refusal>);
 
 impl Refusals {
-    /// Counts a refused message; the first, the hundredth, the ten thousandth and so on of a topic and a
-    /// reason is a warning.
+    /// Counts a rejected message. The first, hundredth, ten thousandth and so on of a topic and a
+    /// reason is logged as a warning.
     pub fn add(&mut self, topic: &str, reason: &'static str, text: impl FnOnce() -> String) {
         let known = |refusal: &&mut Refusal| refusal.topic == topic && refusal.reason == reason;
         let Some(refusal) = self.0.iter_mut().find(known) else {
@@ -47,18 +47,18 @@ impl Refusals {
         }
     }
 
-    /// All of them, in the order of their first message.
+    /// All rejections, in the order of their first message.
     pub fn all(&self) -> &[Refusal] {
         &self.0
     }
 
-    /// The most frequent one whose reason begins so.
+    /// Most frequent rejection whose reason has this prefix.
     pub fn most_frequent(&self, reason: &str) -> Option<&Refusal> {
         most_frequent(&self.0, reason)
     }
 }
 
-/// The most frequent refusal whose reason begins so.
+/// Most frequent rejection whose reason has this prefix.
 pub fn most_frequent<'a>(refusals: &'a [Refusal], reason: &str) -> Option<&'a Refusal> {
     let mut of_kind = refusals.iter().filter(|r| r.reason.starts_with(reason));
     let first = of_kind.next()?;

@@ -1,15 +1,15 @@
-//! Positions held against the speed that a machine may have.
+//! Speed check of positions.
 
 use nalgebra::Vector3;
 
-/// Distance between two positions in any time, m: noise of a receiver, and stamps closer than they were taken.
+/// Tolerated distance between two positions in any time, m: receiver noise, and inaccurate stamps.
 const SLACK_M: f64 = 1.0;
-/// Positions that agree on another place before it is believed.
+/// Number of positions that must agree on another place before it is accepted.
 const AGREEING: usize = 3;
-/// Most positions that are held.
+/// Limit of held positions.
 const MAX_HELD: usize = 4096;
 
-/// A position in a frame that is fixed to the earth.
+/// Position in an earth-fixed frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Placed<T> {
     /// Nanoseconds since the Unix epoch.
@@ -20,40 +20,40 @@ pub(super) struct Placed<T> {
     pub item: T,
 }
 
-/// A step of positions that is too fast.
+/// Step of positions above the speed limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TooFast {
-    /// Distance from the position before, m.
+    /// Distance from the previous position, m.
     pub distance_m: f64,
-    /// Time since the position before, s.
+    /// Time since the previous position, s.
     pub time_s: f64,
 }
 
-/// Treatment of a position.
+/// Decision on a position.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Passed<T> {
-    /// Items to take now, in the order of time.
+    /// Accepted items in the order of time.
     pub taken: Vec<Placed<T>>,
-    /// The step to `taken`, if they are at another place that was held until now.
+    /// Step to `taken`, if they are at another place that was held until now.
     pub jump: Option<TooFast>,
-    /// Steps to items that are refused.
+    /// Steps to rejected items.
     pub refused: Vec<TooFast>,
 }
 
-/// Holds positions that could not be reached, until a position nearer to the last one taken shows that
-/// they are wrong, or enough of them have agreed for long enough.
+/// Holds unreachable positions until a reachable one shows that
+/// they are wrong, or until enough of them have agreed for long enough.
 #[derive(Clone, Debug)]
 pub(super) struct SpeedGate<T> {
     max_speed_m_per_s: f64,
     settle_ns: i64,
     last: Option<(i64, Vector3<f64>)>,
     held: Vec<Placed<T>>,
-    /// The step to the first of them.
+    /// Step to the first held position.
     jump: Option<TooFast>,
 }
 
 impl<T> SpeedGate<T> {
-    /// A gate for a speed in m/s; another place is believed after `settle_ns` nanoseconds.
+    /// Gate for a speed in m/s; another place is accepted after `settle_ns` nanoseconds.
     pub fn new(max_speed_m_per_s: f64, settle_ns: i64) -> Self {
         Self {
             max_speed_m_per_s,
@@ -64,12 +64,12 @@ impl<T> SpeedGate<T> {
         }
     }
 
-    /// Speed beyond which positions are refused, m/s.
+    /// Largest accepted speed, m/s.
     pub fn max_speed_m_per_s(&self) -> f64 {
         self.max_speed_m_per_s
     }
 
-    /// Takes the next position, whose coordinates are finite.
+    /// Handles the next position, whose coordinates are finite.
     pub fn push(&mut self, placed: Placed<T>) -> Passed<T> {
         let mut refused = Vec::new();
         let Some(last) = self.last else {
@@ -116,13 +116,13 @@ impl<T> SpeedGate<T> {
         }
     }
 
-    /// Refuses what is held.
+    /// Rejects held positions.
     pub fn refuse_held(&mut self) -> Vec<TooFast> {
         let jump = self.jump.take();
         self.held.drain(..).filter_map(|_| jump).collect()
     }
 
-    /// Forgets all positions.
+    /// Drops all positions.
     pub fn clear(&mut self) {
         self.last = None;
         self.held.clear();
@@ -130,7 +130,7 @@ impl<T> SpeedGate<T> {
     }
 
     fn take(&mut self, placed: Placed<T>, refused: Vec<TooFast>) -> Passed<T> {
-        // A late one is not where the machine is now.
+        // A late position is not the current one.
         if self
             .last
             .is_none_or(|(stamp_ns, _)| placed.stamp_ns >= stamp_ns)

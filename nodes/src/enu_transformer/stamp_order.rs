@@ -1,39 +1,39 @@
-//! Order of a stream by its stamps: late items are told from a clock that was set.
+//! Stamp order of a stream: distinguishes late items from a clock step.
 
 use std::collections::VecDeque;
 
-/// Step by which stamps of one clock may be older than the newest: an older one is of a clock that was set.
+/// Window of late items: an item older than this relative to the newest belongs to a stepped clock.
 const WINDOW_NS: i64 = 1_000_000_000;
-/// Items in a row that agree on another time before it is believed.
+/// Consecutive items that must agree on another time before it is accepted.
 const AGREEING: usize = 3;
-/// Most items since the newest one that are kept to be handed back: [`WINDOW_NS`] of a stream of 1 kHz.
+/// Limit of stored items since the newest: [`WINDOW_NS`] of a stream at 1 kHz.
 const MAX_SINCE_NEWEST: usize = 1024;
-/// Most, and least, stamps kept for the period of the stream.
+/// Largest and smallest number of stamps stored for the period of the stream.
 const MAX_RECENT: usize = 1024;
 const MIN_RECENT: usize = 16;
-/// Gaps needed for a period.
+/// Number of gaps needed for a period.
 const MIN_GAPS: usize = 4;
 
-/// Treatment of one item of a stream.
+/// Decision on an item of a stream.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Decision<T> {
-    /// Items to take now, with their stamps, in the order of time.
+    /// Accepted items with their stamps, in the order of time.
     pub taken: Vec<(i64, T)>,
-    /// True if the clock was set: all before `taken` is of another time.
+    /// True after a clock step: everything before `taken` has another time base.
     pub is_clock_set: bool,
-    /// Items that are not of the stream's time.
+    /// Rejected items.
     pub refused: Vec<Refused>,
 }
 
-/// Reason for which an item is not taken.
+/// Reason for rejecting an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
-    /// The stamp of the newest item.
+    /// Duplicate of the newest stamp.
     SameStamp {
         /// Nanoseconds since the Unix epoch.
         stamp_ns: i64,
     },
-    /// A stamp on which no others agree.
+    /// Stamp without agreeing neighbours.
     Alone {
         /// Nanoseconds since the Unix epoch.
         stamp_ns: i64,
@@ -55,28 +55,28 @@ impl Refused {
     }
 }
 
-/// Stamps of a stream.
+/// Stamp order of a stream.
 ///
-/// An item older than the newest is late if it fills a hole of the stream, which takes it at its place.
-/// An item that falls between stamps that follow each other without a hole, that is more than a second
-/// older, or that is ahead by more than the limit, is held: three of them, without an item of the stream's
-/// time between them, are a clock that was set, and all items since the newest are handed back; else they
+/// An item older than the newest is late if it fills a hole of the stream; it is inserted in order.
+/// An item between consecutive stamps without a hole, more than a second older, or
+/// ahead by more than the limit, is held. Three held items without an item of the stream's
+/// time between them are a clock step, and all items since the newest are returned; otherwise they are rejected.
 /// are refused.
 #[derive(Clone, Debug)]
 pub(crate) struct StampOrder<T> {
     ahead_ns: i64,
-    /// Stamps taken, ascending, back to [`WINDOW_NS`] and [`MIN_RECENT`].
+    /// Accepted stamps, ascending, back to [`WINDOW_NS`] and [`MIN_RECENT`].
     recent: VecDeque<i64>,
-    /// Items since the newest one, in the order in which they came, late ones too.
+    /// Items since the newest, in the order of arrival, late ones included.
     since: Vec<(i64, T)>,
-    /// Stamps of those of them that are held.
+    /// Stamps of the held items among them.
     held: Vec<i64>,
     /// Greatest delay of a late item, and its stamp.
     latest: Option<(i64, i64)>,
 }
 
 impl<T: Clone> StampOrder<T> {
-    /// An order of a stream whose next item is ahead of the newest by at most so much.
+    /// Order of a stream with at most `ahead_ns` between consecutive items.
     pub fn new(ahead_ns: i64) -> Self {
         Self {
             ahead_ns,
@@ -92,19 +92,19 @@ impl<T: Clone> StampOrder<T> {
         self.recent.back().copied()
     }
 
-    /// True while items are held: it is open whether the clock was set.
+    /// True while items are held: a clock step is undecided.
     pub fn is_open(&self) -> bool {
         !self.held.is_empty()
     }
 
-    /// True while it is open whether the clock was set by so little that stamps before and after are alike.
+    /// True while an undecided clock step is so small that stamps before and after it overlap.
     pub fn is_ambiguous(&self) -> bool {
         let newest_ns = self.newest_ns().unwrap_or(0);
         let mut held = self.held.iter();
         held.any(|stamp_ns| stamp_ns.abs_diff(newest_ns) <= WINDOW_NS.unsigned_abs())
     }
 
-    /// Time by which items of the stream came late within the last `memory_ns`, at most.
+    /// Largest delay of late items within the last `memory_ns`.
     pub fn delay_ns(&self, memory_ns: i64) -> i64 {
         let newest_ns = self.recent.back().copied().unwrap_or(0);
         let latest = self
@@ -113,7 +113,7 @@ impl<T: Clone> StampOrder<T> {
         latest.map_or(0, |(delay_ns, _)| delay_ns)
     }
 
-    /// Takes the next item.
+    /// Handles the next item.
     pub fn push(&mut self, stamp_ns: i64, item: T) -> Decision<T> {
         let Some(&newest_ns) = self.recent.back() else {
             self.note(stamp_ns);
@@ -146,7 +146,7 @@ impl<T: Clone> StampOrder<T> {
         self.hold(stamp_ns, newest_ns)
     }
 
-    /// Ends the stream: what is held is refused.
+    /// Ends the stream: held items are rejected.
     pub fn finish(&mut self) -> Vec<Refused> {
         let newest_ns = self.recent.back().copied().unwrap_or(0);
         self.since.clear();
@@ -154,7 +154,7 @@ impl<T: Clone> StampOrder<T> {
     }
 
     fn hold(&mut self, stamp_ns: i64, newest_ns: i64) -> Decision<T> {
-        // After a small step the new time goes on; after a jump, steps that are small against it agree, as
+        // After a small step the new time continues; after a jump, items agree within steps small against it, as
         // those of a slow sensor.
         let is_near = stamp_ns.abs_diff(newest_ns) <= WINDOW_NS.unsigned_abs();
         let agrees = |last_ns: &i64| match is_near {
@@ -196,7 +196,7 @@ impl<T: Clone> StampOrder<T> {
         self.held.drain(..).map(alone).collect()
     }
 
-    /// True if the stream has no item near a stamp, though by its period it should.
+    /// True if the stream has a hole at a stamp, by its period.
     fn fills_hole(&self, stamp_ns: i64) -> bool {
         let next = self.recent.partition_point(|s| *s < stamp_ns);
         if self.recent.get(next) == Some(&stamp_ns) {
@@ -207,7 +207,7 @@ impl<T: Clone> StampOrder<T> {
             self.recent.get(next),
         );
         let (Some(before_ns), Some(after_ns)) = (before, after) else {
-            // Before all of them: nothing is known of that time while the stream begins.
+            // Older than all: unknown while the stream begins.
             return self.recent.len() < MIN_RECENT;
         };
         let pairs = self.recent.iter().zip(self.recent.iter().skip(1));

@@ -1,4 +1,4 @@
-//! Transforms that the transformer takes and gives.
+//! Transforms received and published by the transformer.
 
 use lattice_core::pose::{PoseMiss, StampedPose, TfMiss};
 use lattice_msgs::geographic_msgs::{GeoPoint, GeoPointStamped};
@@ -12,7 +12,7 @@ use super::{EnuOutput, EnuTransformer};
 use crate::convert::geometry;
 
 impl EnuTransformer {
-    /// Takes transforms of the mounts, or of `odom_frame` -> `base_frame`.
+    /// Handles transforms of the mounts, or of `odom_frame` -> `base_frame`.
     pub fn on_tf(&mut self, message: &TFMessage, is_static: bool, now_ns: i64) -> Vec<EnuOutput> {
         let mut out = Vec::new();
         self.advance(now_ns);
@@ -42,7 +42,7 @@ impl EnuTransformer {
         out
     }
 
-    /// Takes a moving transform in the order of its link.
+    /// Handles a dynamic transform in the order of its link.
     fn on_moving(
         &mut self,
         parent: &str,
@@ -68,7 +68,7 @@ impl EnuTransformer {
         for (stamp_ns, pose) in decision.taken {
             self.insert(parent, child, stamp_ns, pose, false)?;
         }
-        // A transform that is repeated is no news.
+        // A repeated transform is not an error.
         let mut alone = decision
             .refused
             .into_iter()
@@ -95,8 +95,8 @@ impl EnuTransformer {
         Ok(())
     }
 
-    /// True while it is open whether the clock of the poses was set by so little that stamps before and
-    /// after are alike.
+    /// True while an undecided clock step of the poses is so small that stamps before and
+    /// after it overlap.
     pub(super) fn is_order_ambiguous(&self) -> bool {
         match self.has_poses_of_tf() {
             true => self.links.is_ambiguous(),
@@ -104,7 +104,7 @@ impl EnuTransformer {
         }
     }
 
-    /// `map` -> `base_frame` of a pose, or the newest `map` -> `odom_frame` where one is set.
+    /// Publishes `map` -> `base_frame` of a pose, or the newest `map` -> `odom_frame` if set.
     pub(super) fn announce_pose(&mut self, pose: &StampedPose, out: &mut Vec<EnuOutput>) {
         if !self.options.publish_tf {
             return;
@@ -118,8 +118,8 @@ impl EnuTransformer {
         out.push(EnuOutput::Transform(transform));
     }
 
-    /// `map` -> `odom_frame` at the newest time that both the poses and the odometry cover, once for
-    /// each such time: the pose mostly comes before the odometry of its stamp.
+    /// Publishes `map` -> `odom_frame` at the newest time covered by poses and odometry, once for
+    /// each such time: the pose usually arrives before the odometry of its stamp.
     fn announce_odom(&mut self, out: &mut Vec<EnuOutput>) {
         let (Some(odom), true) = (&self.options.odom_frame, self.options.publish_tf) else {
             return;
@@ -150,7 +150,7 @@ impl EnuTransformer {
         self.odom_ns = Some(stamp_ns);
     }
 
-    /// Says once where the map frame lies on the earth.
+    /// Publishes the geodetic origin of the map frame once.
     pub(super) fn announce_origin(&mut self, out: &mut Vec<EnuOutput>) {
         let (false, Some(frame)) = (self.announced, self.ins.frame()) else {
             return;
@@ -177,7 +177,7 @@ impl EnuTransformer {
         }
     }
 
-    /// True for a transform that this node publishes itself.
+    /// True for a transform published by this node.
     fn is_own(&self, transform: &TransformStamped) -> bool {
         let options = &self.options;
         let parent = transform.header.frame_id.trim_start_matches('/');
@@ -210,7 +210,7 @@ impl EnuTransformer {
         })
     }
 
-    /// `base_from_sensor` at a stamp; for clouds in the map frame, which need none, the identity.
+    /// `base_from_sensor` at a stamp; the identity for clouds in the map frame.
     pub(super) fn mount(&self, frame: &str, stamp_ns: i64) -> Result<Isometry3<f64>, TfMiss> {
         if frame == self.options.base_frame || frame == self.options.map_frame {
             return Ok(Isometry3::identity());

@@ -1,4 +1,4 @@
-//! Decision to transform a cloud, to let it wait or to drop it.
+//! Decision to transform, queue or drop a cloud.
 
 use lattice_core::pose::{PoseMiss, TfMiss};
 
@@ -6,14 +6,14 @@ use super::EnuTransformer;
 use super::drops::Drop;
 use super::waiting::WaitingCloud;
 
-/// Treatment of a cloud at a time.
+/// Decision on a cloud at a time.
 pub(super) enum Verdict {
     Transform,
     Wait,
     Drop(Drop),
 }
 
-/// Reason for which poses or mounts do not cover a cloud.
+/// Reason why poses or mounts do not cover a cloud.
 pub(super) struct Uncovered {
     pub reason: Drop,
     /// True if later messages may cover it.
@@ -24,7 +24,7 @@ impl EnuTransformer {
     pub(super) fn verdict(&self, cloud: &WaitingCloud, now_ns: i64) -> Verdict {
         let waited_s = now_ns.saturating_sub(cloud.arrived_ns) as f64 * 1e-9;
         let is_due = waited_s > self.options.longest_wait_s();
-        // A clock that was set, and poses that come late, show with the next poses.
+        // Clock steps and late poses are decided by the next poses.
         let is_open = self.is_order_ambiguous() || self.clocks.is_open(&cloud.clock);
         if !is_due && (is_open || !self.is_settled(cloud.last_ns)) {
             return Verdict::Wait;
@@ -36,7 +36,7 @@ impl EnuTransformer {
         }
     }
 
-    /// Fails unless poses and mounts cover all points of a cloud.
+    /// Checks that poses and mounts cover all points of a cloud.
     pub(super) fn coverage(&self, cloud: &WaitingCloud) -> Result<(), Uncovered> {
         let uncovered = |reason, may_come| Uncovered { reason, may_come };
         for stamp_ns in [cloud.first_ns, cloud.last_ns] {
@@ -55,7 +55,7 @@ impl EnuTransformer {
         Ok(())
     }
 
-    /// True if no pose before a time is missing that comes late, by those that came late until now.
+    /// True if no late pose before a time is expected, by the delays so far.
     fn is_settled(&self, stamp_ns: i64) -> bool {
         let memory_ns = (self.options.pose_span_s * 1e9) as i64;
         let delay_ns = self.order.delay_ns(memory_ns).max(self.expected_delay_ns);

@@ -1,15 +1,15 @@
-//! Names of parameters and nodes that are given to a process, checked before its nodes start.
+//! Validation of parameter and node names before the nodes of a process start.
 //!
-//! | given | is refused if |
+//! | given | is rejected if |
 //! |---|---|
 //! | `-p NODE:NAME:=VALUE`, or NAME in a section of a file that names the node | the node does not know NAME |
 //! | `-p NAME:=VALUE` | no node of the process knows NAME |
-//! | NAME in a section with a wildcard (`/**`) | no node of Lattice knows NAME; a warning where the file is shared |
-//! | a section or rule of a node that Lattice does not have | its name is a misspelling of one that it has |
-//! | a file | all its sections are of nodes that Lattice does not have |
-//! | sections of a node, all of other namespaces | always; a warning where the file is shared |
+//! | NAME in a section with a wildcard (`/**`) | no node of Lattice has NAME; a warning if the file is shared |
+//! | a section or rule of an unknown node | its name is a misspelling of a node of Lattice |
+//! | a file | all its sections are of unknown nodes |
+//! | sections of a node, all of other namespaces | always; a warning if the file is shared |
 //!
-//! Sections of other packages' nodes are left alone. Which names a node knows is in [`Params::unknown`].
+//! Sections of other packages' nodes are ignored. Known names are defined by [`Params::unknown`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,22 +19,22 @@ use lattice_runtime::params::{Addressed, Params, Unknown, addressed, is_near};
 use lattice_runtime::params_file;
 use lattice_runtime::ros_args::RosArgs;
 
-/// Nodes of Lattice that are not in [`PARAMETERS`]: those of bags, and that of `lattice run` itself.
+/// Nodes of Lattice outside [`PARAMETERS`]: those of bags, and that of `lattice run` itself.
 const OTHER_NODES: [&str; 3] = ["bag_player", "bag_recorder", "lattice"];
 
-/// Nodes that a parameter file is meant for.
+/// Scope of the parameter files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Files {
-    /// Those of the whole robot: `ros2 launch` gives one file to many.
+    /// The whole robot: `ros2 launch` passes one file to many nodes.
     Shared,
-    /// Those of this process, as `lattice run` is given it.
+    /// This process, as in `lattice run`.
     Own,
 }
 
-/// A node by its name in the code, with the reader of its parameters; none: it has those of every node only.
+/// A node by its default name, with the declaration of its parameters; `None`: only those of every node.
 pub type NamedNode<'a> = (&'a str, Option<Declare>);
 
-/// Refuses names that the nodes of a process do not know, and logs those that may be of others.
+/// Rejects names unknown to the nodes of a process, and logs those that may belong to others.
 pub fn check_names(args: &RosArgs, nodes: &[NamedNode<'_>], files: Files) -> Result<(), NodeError> {
     let addressed = addressed(args)?;
     let mut read = Vec::new();
@@ -67,7 +67,7 @@ pub fn check_names(args: &RosArgs, nodes: &[NamedNode<'_>], files: Files) -> Res
     }
 }
 
-/// A node that has read its parameters.
+/// A node with declared parameters.
 struct ReadNode<'a> {
     code_name: &'a str,
     params: Params,
@@ -86,7 +86,7 @@ impl ReadNode<'_> {
         }
     }
 
-    /// Refuses parameters that are for this node by name.
+    /// Rejects parameters that address this node by name.
     fn check_named(&self) -> Result<(), NodeError> {
         for unknown in self.params.unknown().iter().filter(|of| of.named) {
             if unknown.is_of_others() {
@@ -104,7 +104,7 @@ impl ReadNode<'_> {
         Ok(())
     }
 
-    /// Refuses sections of this node of which none is for its namespace.
+    /// Rejects sections of this node if none is for its namespace.
     fn check_namespace(
         &self,
         addressed: &BTreeSet<Addressed>,
@@ -137,7 +137,7 @@ impl ReadNode<'_> {
     }
 }
 
-/// Refuses misspelt names of nodes; `names` are those of the process.
+/// Rejects misspelt node names; `names` are those of the process.
 fn check_nodes(
     addressed: &BTreeSet<Addressed>,
     names: &[String],
@@ -150,9 +150,7 @@ fn check_nodes(
             continue;
         }
         if let Some(near) = ours.clone().find(|name| is_near(node, name)) {
-            return Err(
-                format!("{place} names no node that there is; did you mean '{near}'?").into(),
-            );
+            return Err(format!("{place} names an unknown node; did you mean '{near}'?").into());
         }
         others.push(place.as_str());
     }
@@ -162,7 +160,7 @@ fn check_nodes(
     Ok(())
 }
 
-/// Refuses files of which no section is for a node of Lattice.
+/// Rejects files without a section for a node of Lattice.
 fn check_files(args: &RosArgs, names: &[String]) -> Result<(), NodeError> {
     let ours = PARAMETERS.iter().map(|(name, _)| *name).chain(OTHER_NODES);
     let ours: BTreeSet<&str> = ours.chain(names.iter().map(String::as_str)).collect();
@@ -180,7 +178,7 @@ fn check_files(args: &RosArgs, names: &[String]) -> Result<(), NodeError> {
     Ok(())
 }
 
-/// Refuses parameters that are for all nodes and that none knows.
+/// Rejects parameters for all nodes that no node knows.
 fn check_unnamed(nodes: &[ReadNode<'_>], args: &RosArgs, files: Files) -> Result<(), NodeError> {
     let unknown: BTreeSet<Unknown> = nodes
         .iter()
@@ -203,7 +201,7 @@ fn check_unnamed(nodes: &[ReadNode<'_>], args: &RosArgs, files: Files) -> Result
     Ok(())
 }
 
-/// The error of a parameter that no node knows, with the node whose parameter is most like it.
+/// Error for an unknown parameter, with the node that has the most similar one.
 fn error_of(unknown: &Unknown, nodes: &[ReadNode<'_>]) -> NodeError {
     let near = nodes.iter().filter_map(|node| {
         let (name, edits) = node.params.nearest(&unknown.name)?;
@@ -221,7 +219,7 @@ fn error_of(unknown: &Unknown, nodes: &[ReadNode<'_>]) -> NodeError {
     unknown.error(&names.join(", "), None, &help).into()
 }
 
-/// Parameters of all nodes of Lattice, read where they are asked for.
+/// Parameters of all nodes of Lattice, declared on demand.
 struct OfLattice<'a> {
     args: &'a RosArgs,
     read: std::cell::OnceCell<BTreeMap<&'static str, Params>>,
@@ -239,7 +237,7 @@ impl<'a> OfLattice<'a> {
         let read = self.read.get_or_init(|| {
             let read = PARAMETERS.iter().filter_map(|(node, declare)| {
                 let params = Params::of_node(self.args, node).ok()?;
-                // What it has read before a value that is refused counts.
+                // Parameters declared before an invalid value count.
                 let _ = declare(&params);
                 Some((*node, params))
             });

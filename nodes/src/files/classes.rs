@@ -11,16 +11,16 @@ use thiserror::Error;
 /// Longest file, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Error of a file of class names.
+/// Reason for rejecting a file of class names.
 #[derive(Debug, Error)]
 pub enum ClassesError {
     /// The system could not read the file.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// No list of classes.
+    /// Not a list of classes.
     #[error("not YAML of the form \"classes: {{0: wall, 1: floor}}\": {0}")]
     Yaml(#[from] serde_yaml::Error),
-    /// Longer than any list of classes.
+    /// Above the size limit.
     #[error("longer than {MAX_BYTES} bytes")]
     TooLong,
 }

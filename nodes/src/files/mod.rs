@@ -1,7 +1,7 @@
-//! Point files, labelled clouds, meshes and class names in, pictures and meshes of maps out.
+//! Input of point files, labelled clouds, meshes and class names; export of images and meshes of maps.
 
+pub mod atomic_write;
 pub mod classes;
 pub mod export;
 pub mod points;
 pub mod semantic;
-pub mod whole;

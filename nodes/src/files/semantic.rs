@@ -12,7 +12,7 @@ use nalgebra::Point3;
 use super::points::{PointFileOptions, read_points, why_empty};
 
 impl SemanticFile {
-    /// The same, unless it has no points; the error says why, and names the file.
+    /// Checks that the cloud has points; the error names the file and the reason.
     pub fn with_points(self, path: &Path) -> Result<SemanticFile, String> {
         match self.cloud.is_empty() {
             false => Ok(self),
@@ -24,23 +24,23 @@ impl SemanticFile {
     }
 }
 
-/// First bytes of every map file, whatever its version.
+/// First bytes of every map file, of any version.
 const MAP_MAGIC: &[u8; 7] = b"LATTICE";
 
-/// A cloud from a file.
+/// Labelled cloud of a file.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SemanticFile {
-    /// Points in the frame of the file, with labels where the file has some.
+    /// Points in the frame of the file, with labels if the file has any.
     pub cloud: SemanticCloud,
-    /// Side of a cube as large as a voxel, metres, if the file is a map or an octree.
+    /// Cell size (edge of the cube of equal volume), metres, of a map or octree.
     pub cell_side_m: Option<f64>,
-    /// Points left out because a coordinate was NaN or infinite.
+    /// Skipped points with a NaN or infinite coordinate.
     pub skipped_not_finite: usize,
-    /// Points left out because they were 0 0 0.
+    /// Removed points at 0 0 0.
     pub no_returns: usize,
 }
 
-/// Reads a map file or an octree, of which each voxel is a point, or a point file with or without a number `label`.
+/// Reads a map file or an octree, with one point per voxel, or a point file with or without a `label` property.
 ///
 /// Errors name the file.
 pub fn read_semantic(

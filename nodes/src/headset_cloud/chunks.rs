@@ -1,4 +1,4 @@
-//! Surfaces whose chunks have not all come.
+//! Assembly of surfaces from chunks.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,18 +8,18 @@ use lattice_msgs::headset::HeadsetMesh;
 use super::refusal::{MeshRefusal, shown};
 use super::session::MAX_DELAY_NS;
 
-/// Times of a state of a surface, ns.
+/// Stamps of a surface state, ns.
 #[derive(Clone, Copy)]
 pub(super) struct StateTime {
-    /// By the clock of the headset.
+    /// Stamp by the headset's clock.
     pub stamp_ns: i64,
-    /// By the clock of the node.
+    /// Arrival by the node's clock.
     pub arrival_ns: i64,
 }
 
 impl StateTime {
-    /// True if this state was overtaken by the one that is known. One that would have been on its way for longer than
-    /// messages are has the stamp of a clock that was set back.
+    /// True if a newer state has overtaken this one. An older stamp beyond the longest message delay
+    /// means a clock that was set back.
     pub(super) fn is_late(self, known: Self) -> bool {
         let older_ns = known.stamp_ns.saturating_sub(self.stamp_ns);
         let later_ns = self.arrival_ns.saturating_sub(known.arrival_ns);
@@ -27,16 +27,16 @@ impl StateTime {
     }
 }
 
-/// Chunks of a state of a surface.
+/// Chunks of an incomplete surface state.
 struct Pending {
-    /// Of the first chunk.
+    /// Times of the first chunk.
     time: StateTime,
-    /// Surfaces that had begun before.
+    /// Sequence number of the surface.
     number: u64,
     chunks: BTreeMap<u32, Arc<HeadsetMesh>>,
 }
 
-/// States of surfaces that wait for their chunks, in bounded memory.
+/// Incomplete surface states, in bounded memory.
 #[derive(Default)]
 pub(super) struct Chunks {
     pending: BTreeMap<String, Pending>,
@@ -44,13 +44,13 @@ pub(super) struct Chunks {
     begun: u64,
 }
 
-/// Numbers in the arrays of a chunk, and one for the chunk itself.
+/// Memory cost of a chunk: numbers in its arrays, plus one.
 fn numbers(chunk: &HeadsetMesh) -> usize {
     1 + chunk.vertices.len() + chunk.triangles.len() + chunk.classes.len()
 }
 
 impl Chunks {
-    /// Takes a chunk, and gives all of its state once they are there, in order.
+    /// Adds a chunk; returns all chunks of its state in order once they are complete.
     pub fn push(
         &mut self,
         chunk: Arc<HeadsetMesh>,
@@ -79,7 +79,7 @@ impl Chunks {
         {
             return Err(MeshRefusal::Malformed {
                 surface: surface(),
-                problem: "pose and number of chunks are not those of its other chunks",
+                problem: "pose or number of chunks differs from its other chunks",
             });
         }
         if pending.chunks.contains_key(&chunk.chunk) {
@@ -93,7 +93,7 @@ impl Chunks {
         Ok(all.map(|chunks| chunks.into_values().collect()))
     }
 
-    /// Forgets the surfaces that have waited longest until these bounds hold; gives how many.
+    /// Drops the oldest incomplete surfaces until the bounds are met; returns their number.
     pub fn bound(&mut self, max_surfaces: usize, max_numbers: usize) -> u64 {
         let mut gone = 0;
         while self.pending.len() > max_surfaces || self.numbers > max_numbers {
@@ -107,7 +107,7 @@ impl Chunks {
         gone
     }
 
-    /// Forgets what waits of a surface.
+    /// Drops the chunks of a surface.
     pub fn remove(&mut self, surface: &str) -> BTreeMap<u32, Arc<HeadsetMesh>> {
         let gone = self.pending.remove(surface);
         let chunks = gone.map(|gone| gone.chunks).unwrap_or_default();
@@ -116,12 +116,12 @@ impl Chunks {
         chunks
     }
 
-    /// Forgets all.
+    /// Drops all chunks.
     pub fn clear(&mut self) {
         *self = Self::default();
     }
 
-    /// Surfaces that wait.
+    /// Number of incomplete surfaces.
     pub fn len(&self) -> usize {
         self.pending.len()
     }

@@ -1,22 +1,22 @@
-//! Meshes that come as markers.
+//! Meshes received as markers.
 
 use lattice_msgs::headset::HeadsetMesh;
 use lattice_msgs::visualization_msgs::Marker;
 
-/// Beginning of the names of surfaces that are markers.
+/// Prefix of the names of marker surfaces.
 pub(super) const MARKERS: &str = "marker:";
 
-/// Meaning of a marker.
+/// Interpretation of a marker.
 pub(super) enum FromMarker {
-    /// A surface, or word that it is gone.
+    /// A new or removed surface.
     Surface(HeadsetMesh),
-    /// The surfaces with such names are gone.
+    /// Surfaces with this prefix are removed.
     RemoveAll(String),
-    /// Nothing that is a mesh.
+    /// Not a mesh.
     Refused(&'static str, &'static str),
 }
 
-/// A marker of type TRIANGLE_LIST as a surface.
+/// Interprets a marker; type TRIANGLE_LIST is a surface.
 pub(super) fn from_marker(marker: &Marker) -> FromMarker {
     let surface = format!("{MARKERS}{}/{}", marker.ns, marker.id);
     if marker.action == Marker::DELETEALL {
@@ -28,7 +28,7 @@ pub(super) fn from_marker(marker: &Marker) -> FromMarker {
     let removed = marker.action == Marker::DELETE;
     let scale = [marker.scale.x, marker.scale.y, marker.scale.z];
     if !removed && marker.type_ != Marker::TRIANGLE_LIST {
-        return FromMarker::Refused("type", "a marker that is no TRIANGLE_LIST");
+        return FromMarker::Refused("type", "the marker type is not TRIANGLE_LIST");
     }
     if !removed && !scale.iter().all(|v| *v > 0.0 && v.is_finite()) {
         return FromMarker::Refused("malformed", "the scale of a marker is not above 0");

@@ -1,4 +1,4 @@
-//! Meshes and sessions as they come.
+//! Handling of meshes and sessions.
 
 use std::sync::Arc;
 
@@ -7,16 +7,16 @@ use lattice_msgs::visualization_msgs::Marker;
 
 use super::marker::{FromMarker, from_marker};
 use super::refusal::{MeshRefusal, shown};
-use super::session::Told;
+use super::session::SessionUpdate;
 use super::surfaces::Change;
 use super::{HeadsetCloud, HeadsetOutput};
 use crate::mesh::LabelledMesh;
 
-/// Name of the surface that a file is.
+/// Surface name of the mesh file.
 const FILE: &str = "file";
 
 impl HeadsetCloud {
-    /// Takes a surface, a chunk of it, or word that it is gone.
+    /// Handles a surface, a chunk of it, or its removal.
     pub fn on_mesh(&mut self, message: &Arc<HeadsetMesh>) -> Vec<HeadsetOutput> {
         self.counts.meshes_in += 1;
         let mut outputs = Vec::new();
@@ -28,7 +28,7 @@ impl HeadsetCloud {
         outputs
     }
 
-    /// Takes a marker of triangles as a surface of the session that holds.
+    /// Handles a marker of triangles as a surface of the current session.
     pub fn on_marker(&mut self, marker: &Marker) -> Vec<HeadsetOutput> {
         match from_marker(marker) {
             FromMarker::Surface(surface) => return self.on_mesh(&Arc::new(surface)),
@@ -46,19 +46,19 @@ impl HeadsetCloud {
         Vec::new()
     }
 
-    /// Takes a mesh that is there from the start, in the frame and axes of the headset.
+    /// Adds the mesh file, in the frame and axes of the headset.
     pub fn on_mesh_file(&mut self, mesh: &LabelledMesh) -> Result<(), MeshRefusal> {
         let change = self.surfaces.on_file(FILE, mesh)?;
         self.changed(change, 0);
         Ok(())
     }
 
-    /// Takes the session of the headset: another one than before means another origin.
+    /// Handles the session of the headset: a new session has a new origin.
     pub fn on_session(&mut self, text: &str) {
         match self.session.on_topic(text, self.now_ns) {
-            Told::Same | Told::First => {}
-            Told::Another => self.begin_session(),
-            Told::Ended => self.refuse("session", "malformed", "its text is too long"),
+            SessionUpdate::Same | SessionUpdate::First => {}
+            SessionUpdate::Another => self.begin_session(),
+            SessionUpdate::Ended => self.refuse("session", "malformed", "its text is too long"),
         }
     }
 
@@ -68,29 +68,29 @@ impl HeadsetCloud {
         outputs: &mut Vec<HeadsetOutput>,
     ) -> Result<Change, MeshRefusal> {
         self.surfaces.check(message)?;
-        let told = self.session.on_mesh(&message.session, self.now_ns);
-        if told == Told::Ended {
+        let update = self.session.on_mesh(&message.session, self.now_ns);
+        if update == SessionUpdate::Ended {
             return Err(MeshRefusal::OtherSession {
                 surface: shown(&message.surface),
                 found: shown(&message.session),
             });
         }
-        if told == Told::Another {
+        if update == SessionUpdate::Another {
             self.begin_session();
         }
-        if told != Told::Same {
+        if update != SessionUpdate::Same {
             outputs.push(HeadsetOutput::Session(message.session.clone()));
         }
         self.surfaces.on_mesh(message, self.now_ns)
     }
 
-    /// Forgets what was known in the origin before.
+    /// Drops everything in the previous origin.
     fn begin_session(&mut self) {
         self.counts.sessions += 1;
         self.surfaces.clear();
         self.poses.clear();
         self.drop_waiting(Some("other_session"));
-        self.room = None;
+        self.raycast_mesh = None;
         self.changed_ns = None;
     }
 
@@ -101,7 +101,7 @@ impl HeadsetCloud {
         counts.triangles_degenerate += change.degenerate;
         counts.drop_some("mesh", "incomplete", change.incomplete);
         if change.replaced + change.removed > 0 {
-            self.room = None;
+            self.raycast_mesh = None;
             self.changed_ns = Some(stamp_ns);
         }
     }

@@ -1,10 +1,9 @@
-//! From the mesh of a headset and labels of its camera to clouds for `semantic_icp_server`.
+//! `headset_cloud`: clouds for `semantic_icp_server` from the mesh of a headset and labels of its camera.
 //!
-//! [`HeadsetCloud`] is a state machine without I/O; [`node`] runs it behind DDS.
+//! [`HeadsetCloud`] is a state machine without I/O; [`node`] connects it to DDS.
 
 mod chunks;
 mod counts;
-mod look;
 mod marker;
 mod meshes;
 pub mod node;
@@ -14,14 +13,15 @@ mod poses;
 mod refusal;
 mod session;
 mod surfaces;
+mod view;
 mod waiting;
 
-pub use counts::{HeadsetCounts, HeadsetReport, LookCounts};
-pub use look::LookOptions;
+pub use counts::{HeadsetCounts, HeadsetReport, ViewCounts};
 pub use options::{HeadsetOptions, LabelsFrom, PoseSource};
 pub use parameters::declare;
 pub use refusal::MeshRefusal;
 pub use surfaces::MeshOptions;
+pub use view::ViewOptions;
 pub use waiting::HeadsetStream;
 
 use std::sync::Arc;
@@ -32,44 +32,44 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::LabelInfo;
 use nalgebra::Isometry3;
 
-use self::look::{Look, Room, placed};
 use self::poses::{PoseAt, Poses};
 use self::session::Session;
 use self::surfaces::Surfaces;
+use self::view::{LabelledView, RaycastMesh, placed};
 use self::waiting::Waiting;
 use crate::camera::{Camera, Classes, Content, ImageView, LabelSet};
 use crate::convert::geometry::header;
 
-/// Output of the machine.
+/// Output of the state machine.
 #[derive(Clone, Debug, PartialEq)]
 pub enum HeadsetOutput {
-    /// For `headset/points`: in the frame of the headset and the axes of ROS.
+    /// For `headset/points`: in the headset's frame, with the axes of ROS.
     Points(PointCloud2),
-    /// For `headset/label_info`: the names of the classes in `headset/points`.
+    /// For `headset/label_info`: names of the classes in `headset/points`.
     LabelInfo(LabelInfo),
-    /// For `headset/session`: one that the meshes have told of.
+    /// For `headset/session`: a session announced by a mesh.
     Session(String),
 }
 
-/// Keeps the surfaces of a headset's mesh, and casts the pixels of its label images on them.
+/// Stores the surfaces of a headset's mesh, and casts the pixels of its label images onto them.
 ///
-/// Input is checked before it waits, and nothing is allocated by what headers say. The newest
-/// `camera_info` holds for all images, of any size, over the same view.
+/// Input is validated before it is queued, and headers do not determine allocations. The newest
+/// `camera_info` applies to all images of any size with the same view.
 pub struct HeadsetCloud {
     options: HeadsetOptions,
     surfaces: Surfaces,
-    /// The mesh for rays, made with its first image; none in it: it cannot be used.
-    room: Option<Option<Room>>,
-    /// Stamp of the newest change of the mesh that no cloud was made of.
+    /// Mesh for ray casting, built with its first image; inner `None`: the mesh is unusable.
+    raycast_mesh: Option<Option<RaycastMesh>>,
+    /// Stamp of the newest mesh change without a cloud.
     changed_ns: Option<i64>,
     session: Session,
-    /// Time of arrival of what comes next, ns of the node's clock.
+    /// Arrival time of the next input, ns of the node's clock.
     now_ns: i64,
     poses: Poses,
     waiting: Waiting,
     info: Option<Arc<CameraInfo>>,
     camera: Option<Camera>,
-    /// Rays of the camera, made with its first image.
+    /// Camera rays, built with its first image.
     rays: Vec<[f32; 2]>,
     label_info: Option<Arc<LabelInfo>>,
     classes: Classes,
@@ -78,11 +78,11 @@ pub struct HeadsetCloud {
 }
 
 impl HeadsetCloud {
-    /// A machine that has seen nothing.
+    /// Initial state.
     pub fn new(options: HeadsetOptions) -> Self {
         Self {
             surfaces: Surfaces::new(options.mesh.clone()),
-            room: None,
+            raycast_mesh: None,
             changed_ns: None,
             session: Session::default(),
             now_ns: 0,
@@ -99,7 +99,7 @@ impl HeadsetCloud {
         }
     }
 
-    /// Goes on with other options; the names of the classes are told anew.
+    /// Changes the options; class names are published again.
     pub fn set_options(&mut self, options: HeadsetOptions) -> Vec<HeadsetOutput> {
         self.surfaces.set_options(options.mesh.clone());
         self.classes.set_rules(&options.classes);
@@ -112,12 +112,12 @@ impl HeadsetCloud {
         out
     }
 
-    /// Sets the time of arrival of what comes next, ns of a clock that is never set.
+    /// Sets the arrival time of the next input, ns of a steady clock.
     pub fn at(&mut self, now_ns: i64) {
         self.now_ns = now_ns;
     }
 
-    /// Takes an image.
+    /// Handles an image.
     pub fn on_image(&mut self, stream: HeadsetStream, image: Arc<Image>) -> Vec<HeadsetOutput> {
         let (count, content) = match stream {
             HeadsetStream::Labels => (&mut self.counts.labels_in, Content::Labels),
@@ -145,7 +145,7 @@ impl HeadsetCloud {
         self.serve()
     }
 
-    /// Takes labels that a network has made, with what came with them.
+    /// Handles labels of the built-in network, with companion images.
     pub fn on_labelled(&mut self, labels: LabelSet) -> Vec<HeadsetOutput> {
         self.counts.labels_in += 1;
         if labels.reader(1, self.options.max_image_pixels).is_none() {
@@ -158,14 +158,14 @@ impl HeadsetCloud {
         self.serve()
     }
 
-    /// Counts images that left for others: one of the same stamp, and those that came first.
+    /// Counts dropped images: a duplicate stamp, and the oldest ones.
     fn left(&mut self, stream: HeadsetStream, [repeated, oldest]: [u64; 2]) {
         let reason = self.missing(stream);
         self.counts.drop_some(stream.name(), "repeated", repeated);
         self.counts.drop_some(stream.name(), reason, oldest);
     }
 
-    /// Takes the calibration of the camera. One that cannot be used leaves the node without.
+    /// Handles the camera calibration. An invalid one removes the previous one.
     pub fn on_camera_info(&mut self, info: Arc<CameraInfo>) -> Vec<HeadsetOutput> {
         let (width, height) = (info.width, info.height);
         let pixels = u64::from(width) * u64::from(height);
@@ -175,7 +175,7 @@ impl HeadsetCloud {
             Err(error) => Some((error.name(), error.to_string())),
             Ok(_) if pixels == 0 || pixels > max as u64 => {
                 let problem =
-                    format!("{width} x {height} pixels, not from 1 to `max_image_pixels` {max}");
+                    format!("{width} x {height} pixels, outside 1 to `max_image_pixels` {max}");
                 Some(("size", problem))
             }
             Ok(_) => None,
@@ -192,14 +192,14 @@ impl HeadsetCloud {
         self.serve()
     }
 
-    /// Takes the names of the classes.
+    /// Handles the class names.
     pub fn on_label_info(&mut self, info: Arc<LabelInfo>) -> Vec<HeadsetOutput> {
         self.classes.set_threshold(info.threshold);
         self.label_info = Some(info);
         self.names().into_iter().collect()
     }
 
-    /// Takes a pose of the camera in the frame of the headset.
+    /// Handles a camera pose in the headset's frame.
     pub fn on_pose(&mut self, pose: &PoseStamped) -> Vec<HeadsetOutput> {
         self.counts.poses_in += 1;
         let frame = &self.options.mesh.headset_frame;
@@ -212,7 +212,7 @@ impl HeadsetCloud {
         }
     }
 
-    /// Takes transforms.
+    /// Handles transforms.
     pub fn on_tf(&mut self, message: &TFMessage, is_static: bool) -> Vec<HeadsetOutput> {
         self.counts.poses_in += message.transforms.len() as u64;
         let refused = self.poses.on_tf(message, is_static);
@@ -220,7 +220,7 @@ impl HeadsetCloud {
         self.serve()
     }
 
-    /// Makes a cloud of the mesh itself, if that is asked for and it has changed.
+    /// Samples the mesh itself into a cloud, if configured and changed.
     pub fn tick(&mut self) -> Vec<HeadsetOutput> {
         if self.options.labels_from == LabelsFrom::Image {
             return Vec::new();
@@ -228,13 +228,13 @@ impl HeadsetCloud {
         let Some(stamp_ns) = self.changed_ns.take() else {
             return Vec::new();
         };
-        self.build_room();
-        let Some(Some(room)) = &self.room else {
+        self.build_raycast_mesh();
+        let Some(Some(raycast_mesh)) = &self.raycast_mesh else {
             return Vec::new();
         };
         let (spacing_m, max_points) = (self.options.spacing_m, self.options.max_points);
         let counts = &mut self.counts.look;
-        let points = room.sampled(spacing_m, max_points, &self.classes, counts);
+        let points = raycast_mesh.sampled(spacing_m, max_points, &self.classes, counts);
         if points.is_empty() {
             return Vec::new();
         }
@@ -243,7 +243,7 @@ impl HeadsetCloud {
         vec![HeadsetOutput::Points(points.cloud(header))]
     }
 
-    /// Ends the input: what still waits is counted.
+    /// Ends the input: queued images are counted.
     pub fn finish(&mut self) -> Vec<HeadsetOutput> {
         let outputs = self.tick();
         self.drop_waiting(None);
@@ -255,27 +255,27 @@ impl HeadsetCloud {
         &self.counts
     }
 
-    /// Images that wait for others, and surfaces that wait for chunks.
+    /// Queued images, and incomplete surfaces.
     pub fn waiting(&self) -> [usize; 2] {
         [self.waiting.len(), self.surfaces.waiting()]
     }
 
-    /// Surfaces that are known, and their triangles.
+    /// Number of surfaces and of triangles.
     pub fn mesh_size(&self) -> [usize; 2] {
         [self.surfaces.len(), self.surfaces.triangles()]
     }
 
-    /// True if there is a camera to cast rays from.
+    /// True with a valid camera calibration.
     pub fn has_camera(&self) -> bool {
         self.camera.is_some()
     }
 
-    /// The last refusal in words.
+    /// Text of the last rejection.
     pub fn problem(&self) -> Option<&str> {
         self.problem.as_deref()
     }
 
-    /// Clouds of all images whose pose is known by now.
+    /// Clouds of all images whose pose is available.
     fn serve(&mut self) -> Vec<HeadsetOutput> {
         let mut outputs = Vec::new();
         if self.camera.is_none() || self.surfaces.len() == 0 {
@@ -294,7 +294,7 @@ impl HeadsetCloud {
             match pose {
                 Some(pose) => outputs.extend(self.cloud(&set, &pose).map(HeadsetOutput::Points)),
                 None => {
-                    let problem = "there is no pose at its stamp, only before and behind";
+                    let problem = "there is no pose at its stamp, only before and after it";
                     self.refuse("labels", "no_pose", problem);
                 }
             }
@@ -303,9 +303,9 @@ impl HeadsetCloud {
     }
 
     fn cloud(&mut self, set: &LabelSet, pose: &Isometry3<f64>) -> Option<PointCloud2> {
-        self.build_room();
+        self.build_raycast_mesh();
         let camera = self.camera.as_ref()?;
-        let Some(Some(room)) = &self.room else {
+        let Some(Some(raycast_mesh)) = &self.raycast_mesh else {
             self.counts.drop_some("labels", "no_mesh", 1);
             return None;
         };
@@ -314,18 +314,18 @@ impl HeadsetCloud {
         }
         let width = camera.width as usize;
         let Some(pixels) = set.reader(width, self.options.max_image_pixels) else {
-            // The limit may be lower than when they came.
+            // The limit may have been reduced since they arrived.
             self.refuse("labels", "too_large", "larger than `max_image_pixels`");
             return None;
         };
-        let mut look = Look {
+        let mut view = LabelledView {
             pixels,
             rays: &self.rays,
             width,
             camera: placed(pose, self.options.pose_axes(), self.options.camera_axes),
         };
         let counts = &mut self.counts.look;
-        match room.see(&mut look, &self.options.look, &self.classes, counts) {
+        match raycast_mesh.see(&mut view, &self.options.look, &self.classes, counts) {
             Ok(points) if points.is_empty() => {
                 let problem = "none of its rays meets the mesh";
                 self.refuse("labels", "sees_no_mesh", problem);
@@ -341,8 +341,8 @@ impl HeadsetCloud {
             }
             Err([behind, hits]) => {
                 let problem = format!(
-                    "the mesh is inside out, {behind} of {hits} rays meet it from behind: check `headset_axes`, \
-                     or turn its triangles"
+                    "the mesh is inside out: {behind} of {hits} rays hit it from behind; check `headset_axes`, \
+                     or reverse its triangles"
                 );
                 self.refuse("labels", "mesh_inside_out", &problem);
                 None
@@ -350,16 +350,16 @@ impl HeadsetCloud {
         }
     }
 
-    /// Makes the mesh for rays if it has changed.
-    fn build_room(&mut self) {
-        if self.room.is_some() {
+    /// Rebuilds the ray casting index after a change.
+    fn build_raycast_mesh(&mut self) {
+        if self.raycast_mesh.is_some() {
             return;
         }
-        let room = self.surfaces.merged().and_then(Room::new);
-        if let Err(error) = &room {
+        let raycast_mesh = self.surfaces.merged().and_then(RaycastMesh::new);
+        if let Err(error) = &raycast_mesh {
             self.refuse("mesh", error.name(), &error.to_string());
         }
-        self.room = Some(room.ok());
+        self.raycast_mesh = Some(raycast_mesh.ok());
     }
 
     /// Names of the classes that points may have.
@@ -368,7 +368,7 @@ impl HeadsetCloud {
         Some(HeadsetOutput::LabelInfo(info))
     }
 
-    /// Reason for which images wait.
+    /// Reason why images are queued.
     fn missing(&self, stream: HeadsetStream) -> &'static str {
         match stream {
             HeadsetStream::Confidence => "no_labels",

@@ -1,4 +1,4 @@
-//! The machine as a ROS node: a thin shell around [`HeadsetCloud`].
+//! ROS node around [`HeadsetCloud`].
 
 use std::path::Path;
 use std::sync::Arc;
@@ -25,7 +25,9 @@ use crate::segmenter::{self, LoadedNetwork, NetworkEvent, NetworkView, Worker};
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Losses, Node, Publisher, Runtime, Subscription};
+use lattice_runtime::{
+    Diagnostics, Level, Losses, Node, Publisher, Runtime, Subscription, SubscriptionExecutor,
+};
 
 /// Event for the compute thread.
 enum Event {
@@ -37,7 +39,7 @@ enum Event {
     LabelInfo(Arc<LabelInfo>),
     Pose(Arc<PoseStamped>),
     Transforms(Arc<TFMessage>, bool),
-    /// Of the network inside of the node.
+    /// Event of the built-in network.
     Network(NetworkEvent),
     Tick,
     Settings(Box<HeadsetOptions>),
@@ -73,7 +75,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         None => None,
     };
     let (lost, losses) = (Arc::new(AtomicU64::new(0)), Losses::default());
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         machine,
         points: node.publisher("headset/points", Qos::SCANS)?,
         label_info: node.publisher("headset/label_info", Qos::LATCHED)?,
@@ -87,10 +89,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         warned: 0,
         report_file: settings.report_file.clone(),
     };
-    shell.tell_names();
+    compute_state.publish_names();
     let shutdown = runtime.shutdown_handle();
     let compute = Compute::spawn(name, settings.limits, shutdown.clone(), move |event| {
-        shell.on(event)
+        compute_state.on(event)
     })?;
     let inbox = compute.inbox();
     let mut inputs = subscribe(&node, &inbox, &lost, &settings)?;
@@ -140,19 +142,29 @@ fn subscribe(
     let marker = inbox.counting(lost, Event::Marker, |marker| 24 * marker.points.len());
     let session = inbox.counting(lost, Event::Session, |session| session.data.len());
     let mut inputs = vec![
-        node.subscribe("headset/mesh", Qos::reliable(1000), Load::Large, mesh)?,
+        node.subscribe(
+            "headset/mesh",
+            Qos::reliable(1000),
+            SubscriptionExecutor::Dedicated,
+            mesh,
+        )?,
         node.subscribe(
             "headset/mesh_marker",
             Qos::reliable(1000),
-            Load::Large,
+            SubscriptionExecutor::Dedicated,
             marker,
         )?,
-        node.subscribe("headset/session", Qos::LATCHED, Load::Small, session)?,
+        node.subscribe(
+            "headset/session",
+            Qos::LATCHED,
+            SubscriptionExecutor::Shared,
+            session,
+        )?,
     ];
     if settings.network.is_none() {
         let names = inbox.counting(lost, Event::LabelInfo, |_| 0);
         let topic = "headset/labels/label_info";
-        inputs.push(node.subscribe(topic, Qos::LATCHED, Load::Small, names)?);
+        inputs.push(node.subscribe(topic, Qos::LATCHED, SubscriptionExecutor::Shared, names)?);
     }
     if options.labels_from == LabelsFrom::Mesh {
         return Ok(inputs);
@@ -161,52 +173,77 @@ fn subscribe(
     if settings.network.is_none() {
         let labels = |image| Event::Image(HeadsetStream::Labels, image);
         let labels = inbox.counting(lost, labels, bytes);
-        inputs.push(node.subscribe("headset/labels/image", Qos::SENSOR, Load::Large, labels)?);
+        inputs.push(node.subscribe(
+            "headset/labels/image",
+            Qos::SENSOR,
+            SubscriptionExecutor::Dedicated,
+            labels,
+        )?);
     }
     if options.use_confidence {
         let confidence = |image| Event::Image(HeadsetStream::Confidence, image);
         let confidence = inbox.counting(lost, confidence, bytes);
         let topic = "headset/labels/confidence";
-        inputs.push(node.subscribe(topic, Qos::SENSOR, Load::Large, confidence)?);
+        inputs.push(node.subscribe(
+            topic,
+            Qos::SENSOR,
+            SubscriptionExecutor::Dedicated,
+            confidence,
+        )?);
     }
     let camera = inbox.counting(lost, Event::CameraInfo, |_| 0);
-    inputs.push(node.subscribe("headset/camera_info", Qos::SENSOR, Load::Small, camera)?);
+    inputs.push(node.subscribe(
+        "headset/camera_info",
+        Qos::SENSOR,
+        SubscriptionExecutor::Shared,
+        camera,
+    )?);
     match options.poses {
         PoseSource::Topic => {
             let pose = inbox.counting(lost, Event::Pose, |_| 0);
-            inputs.push(node.subscribe("headset/pose", Qos::INS, Load::Small, pose)?);
+            inputs.push(node.subscribe(
+                "headset/pose",
+                Qos::INS,
+                SubscriptionExecutor::Shared,
+                pose,
+            )?);
         }
         PoseSource::Tf => {
             let moving = inbox.counting(lost, |m| Event::Transforms(m, false), |_| 0);
-            inputs.push(node.subscribe("/tf", Qos::TF, Load::Small, moving)?);
+            inputs.push(node.subscribe("/tf", Qos::TF, SubscriptionExecutor::Shared, moving)?);
             let fixed = inbox.counting(lost, |m| Event::Transforms(m, true), |_| 0);
             let latched = Qos::TF_STATIC_LISTENER;
-            inputs.push(node.subscribe("/tf_static", latched, Load::Small, fixed)?);
+            inputs.push(node.subscribe(
+                "/tf_static",
+                latched,
+                SubscriptionExecutor::Shared,
+                fixed,
+            )?);
         }
     }
     Ok(inputs)
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     machine: HeadsetCloud,
     points: Publisher<PointCloud2>,
     label_info: Publisher<LabelInfo>,
     session: Publisher<std_msgs::String>,
     network: Option<NetworkView>,
     diagnostics: Diagnostics,
-    /// Messages that found the inbox full, and those lost before it.
+    /// Messages rejected by the inbox or lost before it.
     lost: Arc<AtomicU64>,
     losses: Losses,
     warnings: Throttle,
-    /// Start of the node.
+    /// Start time of the node.
     begin: Instant,
-    /// Messages dropped when there was a warning last.
+    /// Dropped messages at the last warning.
     warned: u64,
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         let machine = &mut self.machine;
         let elapsed = self.begin.elapsed().as_nanos();
@@ -224,10 +261,10 @@ impl Shell {
             Event::Pose(pose) => machine.on_pose(&pose),
             Event::Transforms(message, is_static) => machine.on_tf(&message, is_static),
             Event::Network(NetworkEvent::Labelled(labels)) => machine.on_labelled(labels),
-            // Poses are kept for longer than an image takes.
+            // Poses are kept longer than the processing of an image.
             Event::Network(NetworkEvent::Begun(_)) => return,
             Event::Network(NetworkEvent::Names) => {
-                self.tell_names();
+                self.publish_names();
                 return;
             }
             Event::Settings(options) => machine.set_options(*options),
@@ -246,8 +283,8 @@ impl Shell {
         self.publish(outputs);
     }
 
-    /// Names of the classes of the network inside of the node.
-    fn tell_names(&mut self) {
+    /// Publishes the class names of the built-in network.
+    fn publish_names(&mut self) {
         let info = self.network.as_ref().and_then(NetworkView::label_info);
         if let Some(info) = info {
             let outputs = self.machine.on_label_info(Arc::new(info));
@@ -306,7 +343,7 @@ impl Shell {
             && self.warnings.check().is_some()
         {
             self.warned = dropped;
-            log::warn!("{message}; last refused: {problem}");
+            log::warn!("{message}; last rejection: {problem}");
         }
         let [images, chunked] = self.machine.waiting();
         let mut values = report::key_values(&report);

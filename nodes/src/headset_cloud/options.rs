@@ -2,18 +2,18 @@
 
 use lattice_core::pose::Axes;
 
-use super::look::LookOptions;
 use super::surfaces::MeshOptions;
+use super::view::ViewOptions;
 use crate::camera::ClassRules;
 use crate::options::{frame, one_of};
 use lattice_runtime::params::{ParamError, Params};
 
-/// Most images of a topic that a parameter may let wait.
+/// Largest settable queue of images per topic.
 const MAX_QUEUE: usize = 1000;
-/// Most triangles that a parameter may allow.
+/// Largest settable number of triangles.
 const MAX_TRIANGLES: usize = 20_000_000;
 
-/// Origin of the classes of points.
+/// Source of the classes of points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LabelsFrom {
     /// The pixels of label images.
@@ -22,43 +22,43 @@ pub enum LabelsFrom {
     Mesh,
 }
 
-/// Origin of the poses of the camera.
+/// Source of the camera poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PoseSource {
     /// PoseStamped messages, in the axes of the headset.
     Topic,
-    /// Transforms, which are always in the axes of ROS.
+    /// Transforms, always in the axes of ROS.
     Tf,
 }
 
 /// Options of a [`super::HeadsetCloud`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeadsetOptions {
-    /// Rules for the mesh.
+    /// Bounds of the mesh.
     pub mesh: MeshOptions,
-    /// Axes of the camera's own frame.
+    /// Axis convention of the camera's frame.
     pub camera_axes: Axes,
-    /// Origin of the poses of the camera.
+    /// Source of the camera poses.
     pub poses: PoseSource,
-    /// Longest time between two poses that is interpolated over, s.
+    /// Longest gap between two poses for interpolation, s.
     pub max_pose_gap_s: f64,
-    /// Origin of the classes.
+    /// Source of the classes.
     pub labels_from: LabelsFrom,
-    /// Distance of points that are taken all over the mesh, m.
+    /// Spacing of points sampled over the mesh, m.
     pub spacing_m: f64,
-    /// Most points of such a cloud.
+    /// Limit of points of a sampled cloud.
     pub max_points: usize,
-    /// Label images that wait for their pose; the oldest goes.
+    /// Label images queued for their pose; the oldest is dropped.
     pub queue_size: usize,
     /// True if labels wait for confidences of their stamp.
     pub use_confidence: bool,
-    /// Images of more pixels are refused.
+    /// Larger images are rejected, pixels.
     pub max_image_pixels: usize,
-    /// True if the images are rectified: `p` of the camera holds, and its distortion does not.
+    /// True for rectified images: `p` of the camera is used, without distortion.
     pub rectified: bool,
-    /// Choice of the pixels that become points.
-    pub look: LookOptions,
-    /// Meaning of the classes.
+    /// Selection of the pixels that become points.
+    pub look: ViewOptions,
+    /// Mapping of the classes.
     pub classes: ClassRules,
 }
 
@@ -97,7 +97,7 @@ impl HeadsetOptions {
             use_confidence: params.bool("use_confidence", false)?,
             max_image_pixels: params.positive("max_image_pixels", 4_000_000)?,
             rectified: params.bool("rectified", false)?,
-            look: LookOptions {
+            look: ViewOptions {
                 stride: params.positive("stride", 4)?,
                 min_range_m,
                 max_range_m,
@@ -107,7 +107,7 @@ impl HeadsetOptions {
         })
     }
 
-    /// Axes that poses of the camera are in.
+    /// Axis convention of the camera poses.
     pub fn pose_axes(&self) -> Axes {
         match self.poses {
             PoseSource::Topic => self.mesh.axes,
@@ -116,7 +116,7 @@ impl HeadsetOptions {
     }
 }
 
-/// Axes of the camera: of the same handedness as those of its poses, as no rotation goes from one to the other.
+/// Axis convention of the camera. It must have the handedness of its poses, since no rotation changes it.
 fn camera_axes(params: &Params, of_poses: Axes) -> Result<Axes, ParamError> {
     let usual = match of_poses {
         Axes::RosFlu => Axes::Optical,

@@ -1,4 +1,4 @@
-//! Poses of the camera by time.
+//! Time-indexed camera poses.
 
 use lattice_core::pose::{
     PoseBuffer, PoseBufferOptions, PoseMiss, PushOutcome, StampedPose, TfMiss, TransformBuffer,
@@ -12,13 +12,13 @@ use super::options::{HeadsetOptions, PoseSource};
 use super::refusal::shown;
 use crate::convert::geometry;
 
-/// Answer to the question for a pose.
+/// Result of a pose query.
 pub(super) enum PoseAt {
     /// `origin_from_camera`.
     Known(Isometry3<f64>),
-    /// The next poses may tell.
+    /// Later poses may cover the time.
     Later,
-    /// The poses around the time are missing.
+    /// No pose will cover the time.
     Never,
 }
 
@@ -46,7 +46,7 @@ impl Poses {
         }
     }
 
-    /// Takes a pose of the camera; else the reason and the problem.
+    /// Adds a camera pose, or returns reason and text of its rejection.
     pub fn on_pose(
         &mut self,
         message: &PoseStamped,
@@ -62,7 +62,12 @@ impl Poses {
             return Err(("frame", problem));
         }
         let pose = geometry::isometry_from_pose(&message.pose);
-        let malformed = || ("malformed", "the pose is not finite or no turn".to_owned());
+        let malformed = || {
+            (
+                "malformed",
+                "the pose is not finite or its rotation is zero".to_owned(),
+            )
+        };
         let outcome = poses.push(StampedPose {
             stamp_ns: message.header.stamp.to_ns(),
             map_from_base: pose.ok_or_else(malformed)?,
@@ -77,7 +82,7 @@ impl Poses {
         }
     }
 
-    /// Takes transforms; gives how many were refused.
+    /// Adds transforms; returns the number of rejected ones.
     pub fn on_tf(&mut self, message: &TFMessage, is_static: bool) -> u64 {
         let Self::Tf(transforms) = self else {
             return 0;
@@ -96,7 +101,7 @@ impl Poses {
         refused
     }
 
-    /// The pose of a camera at a time.
+    /// Pose of a camera at a time.
     pub fn at(&self, headset_frame: &str, camera: &str, stamp_ns: i64) -> PoseAt {
         match self {
             Self::Topic(poses) => match poses.at(stamp_ns) {
@@ -112,7 +117,7 @@ impl Poses {
         }
     }
 
-    /// Forgets the poses of a session that has ended.
+    /// Drops the poses of an ended session.
     pub fn clear(&mut self) {
         if let Self::Topic(poses) = self {
             poses.clear();

@@ -1,26 +1,26 @@
-//! Errors of meshes that cannot be used.
+//! Reasons for rejecting meshes.
 
 use thiserror::Error;
 
 use crate::mesh::MeshError;
 
-/// Error of a surface of a mesh that cannot be used.
+/// Reason for rejecting a surface.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum MeshRefusal {
-    /// A frame that is not the headset's.
+    /// Frame other than the headset's.
     #[error("surface in frame '{found}', expected '{expected}'")]
     Frame { found: String, expected: String },
-    /// A message whose parts do not fit each other.
+    /// Inconsistent message.
     #[error("surface '{surface}': {problem}")]
     Malformed {
         surface: String,
         problem: &'static str,
     },
-    /// Triangles that are none.
+    /// Invalid triangles.
     #[error("surface '{surface}': {error}")]
     Mesh { surface: String, error: MeshError },
-    /// More than `max_triangles` in all surfaces.
+    /// Total triangles above `max_triangles`.
     #[error(
         "surface '{surface}': {triangles} triangles with the other surfaces, more than `max_triangles` {max}"
     )]
@@ -29,22 +29,22 @@ pub enum MeshRefusal {
         triangles: usize,
         max: usize,
     },
-    /// More than `max_surfaces`.
+    /// Surfaces above `max_surfaces`.
     #[error("surface '{surface}': more surfaces than `max_surfaces` {max}")]
     TooManySurfaces { surface: String, max: usize },
-    /// A session that has ended.
+    /// Surface of an ended session.
     #[error("surface '{surface}' of session '{found}', which has ended")]
     OtherSession { surface: String, found: String },
-    /// A state of a surface that is older than what is there.
-    #[error("surface '{surface}': older than what is there")]
+    /// Surface state older than the current one.
+    #[error("surface '{surface}': older than its current state")]
     Stale { surface: String },
-    /// A chunk that has come before.
-    #[error("surface '{surface}': chunk {chunk} has come before")]
+    /// Duplicate chunk.
+    #[error("surface '{surface}': duplicate chunk {chunk}")]
     Repeated { surface: String, chunk: u32 },
 }
 
 impl MeshRefusal {
-    /// Name under which it is counted.
+    /// Counter name.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Frame { .. } => "frame",
@@ -59,7 +59,7 @@ impl MeshRefusal {
     }
 }
 
-/// The first letters of a name from outside.
+/// Foreign name, shortened.
 pub(super) fn shown(name: &str) -> String {
     name.chars().take(64).collect()
 }

@@ -1,4 +1,4 @@
-//! The mesh of a headset: surfaces by name, in its origin and the axes of ROS.
+//! Mesh of a headset: surfaces by name, in its origin and the axes of ROS.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,24 +15,24 @@ use crate::mesh::{LabelledMesh, MeshError};
 
 /// Longest name of a surface or a session, bytes.
 const MAX_NAME: usize = 256;
-/// Most chunks of a surface.
+/// Limit of chunks per surface.
 const MAX_CHUNKS: u32 = 1 << 16;
 
-/// Rules for the mesh of a headset.
+/// Bounds of the mesh of a headset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MeshOptions {
-    /// Frame that surfaces must be in.
+    /// Required frame of surfaces.
     pub headset_frame: String,
-    /// Axes of that frame and of the surfaces.
+    /// Axis convention of that frame.
     pub axes: Axes,
-    /// Most triangles of all surfaces, and vertices.
+    /// Limit of triangles of all surfaces, and of vertices.
     pub max_triangles: usize,
-    /// Most surfaces.
+    /// Limit of surfaces.
     pub max_surfaces: usize,
 }
 
-/// A surface, its vertices in the headset's origin and the axes of ROS, seen from where its corners go
-/// counterclockwise.
+/// A surface with vertices in the headset's origin and the axes of ROS; counterclockwise triangles face the
+/// viewer.
 struct Surface {
     time: StateTime,
     mesh: LabelledMesh,
@@ -43,15 +43,15 @@ struct Surface {
 pub(super) struct Change {
     /// Surfaces that are new or replaced.
     pub replaced: u64,
-    /// Surfaces that are gone.
+    /// Removed surfaces.
     pub removed: u64,
-    /// Triangles left out since they have no area.
+    /// Rejected triangles without area.
     pub degenerate: u64,
-    /// Surfaces forgotten before all of their chunks came.
+    /// Surfaces dropped before their chunks were complete.
     pub incomplete: u64,
 }
 
-/// Surfaces of one session, each replaced whole.
+/// Surfaces of one session, each replaced as a whole.
 pub(super) struct Surfaces {
     options: MeshOptions,
     surfaces: BTreeMap<String, Surface>,
@@ -67,12 +67,12 @@ impl Surfaces {
         }
     }
 
-    /// Goes on with other bounds.
+    /// Changes the bounds.
     pub fn set_options(&mut self, options: MeshOptions) {
         self.options = options;
     }
 
-    /// Takes a surface, a chunk of it, or word that it is gone, which were checked.
+    /// Applies a validated surface, a chunk of it, or its removal.
     pub fn on_mesh(
         &mut self,
         message: &Arc<HeadsetMesh>,
@@ -104,7 +104,7 @@ impl Surfaces {
         Ok(change)
     }
 
-    /// Takes a mesh in the headset's origin and axes as a surface.
+    /// Adds a mesh in the headset's origin and axes as a surface.
     pub fn on_file(&mut self, name: &str, mesh: &LabelledMesh) -> Result<Change, MeshRefusal> {
         let triangles = mesh.triangles().iter().copied();
         let at = Isometry3::identity();
@@ -129,30 +129,30 @@ impl Surfaces {
         })
     }
 
-    /// Forgets the surfaces whose names begin like this; gives how many.
+    /// Removes the surfaces with a name prefix; returns their number.
     pub fn remove_all(&mut self, prefix: &str) -> u64 {
         let before = self.surfaces.len();
         self.surfaces.retain(|name, _| !name.starts_with(prefix));
         (before - self.surfaces.len()) as u64
     }
 
-    /// Forgets everything.
+    /// Removes everything.
     pub fn clear(&mut self) {
         self.surfaces.clear();
         self.chunks.clear();
     }
 
-    /// Surfaces.
+    /// Number of surfaces.
     pub fn len(&self) -> usize {
         self.surfaces.len()
     }
 
-    /// Surfaces that wait for chunks.
+    /// Number of incomplete surfaces.
     pub fn waiting(&self) -> usize {
         self.chunks.len()
     }
 
-    /// Triangles of all surfaces.
+    /// Number of triangles of all surfaces.
     pub fn triangles(&self) -> usize {
         self.surfaces.values().map(|s| s.mesh.len()).sum()
     }
@@ -171,7 +171,7 @@ impl Surfaces {
         LabelledMesh::new(vertices_m, triangles, classes, instances)
     }
 
-    /// Checks the parts of a message that are of one size.
+    /// Validates the scalar fields of a message.
     pub fn check(&self, message: &HeadsetMesh) -> Result<(), MeshRefusal> {
         let found = message.header.frame_id.trim_start_matches('/');
         if found != self.options.headset_frame {
@@ -185,7 +185,7 @@ impl Surfaces {
         } else if message.removed {
             return Ok(());
         } else if message.chunks == 0 || message.chunks > MAX_CHUNKS {
-            "`chunks` is not from 1 to 65536"
+            "`chunks` is outside 1..=65536"
         } else if message.chunk >= message.chunks {
             "`chunk` is not below `chunks`"
         } else {
@@ -195,7 +195,7 @@ impl Surfaces {
         Err(MeshRefusal::Malformed { surface, problem })
     }
 
-    /// The mesh of all chunks, and how many of its triangles were left out.
+    /// Mesh of all chunks, and the number of rejected triangles.
     fn joined(&self, chunks: &[Arc<HeadsetMesh>]) -> Result<(LabelledMesh, u64), MeshRefusal> {
         let surface = || shown(chunks.first().map_or("", |chunk| &chunk.surface));
         let malformed = |problem| MeshRefusal::Malformed {
@@ -203,18 +203,20 @@ impl Surfaces {
             problem,
         };
         let pose = chunks.first().map(|chunk| chunk.pose).unwrap_or_default();
-        let origin_from_surface =
-            isometry_from_pose(&pose).ok_or_else(|| malformed("its pose is none"))?;
+        let origin_from_surface = isometry_from_pose(&pose)
+            .ok_or_else(|| malformed("its pose is not finite or its rotation is zero"))?;
         let numbers: Vec<f32> = chunks.iter().flat_map(|c| &c.vertices).copied().collect();
         let corners: Vec<u32> = chunks.iter().flat_map(|c| &c.triangles).copied().collect();
         let mut classes: Vec<u16> = chunks.iter().flat_map(|c| &c.classes).copied().collect();
         let (vertices_m, rest) = numbers.as_chunks::<3>();
         if !rest.is_empty() {
-            return Err(malformed("three numbers make a vertex"));
+            return Err(malformed(
+                "the number of coordinates is not a multiple of 3",
+            ));
         }
         let (triangles, rest) = corners.as_chunks::<3>();
         if !rest.is_empty() {
-            return Err(malformed("three vertices make a triangle"));
+            return Err(malformed("the number of indices is not a multiple of 3"));
         }
         if classes.is_empty() {
             classes = vec![UNLABELED; triangles.len()];
@@ -232,8 +234,8 @@ impl Surfaces {
         })
     }
 
-    /// A mesh in the axes of ROS, with its triangles turned if those of the headset are left-handed, and
-    /// without those that have no area.
+    /// Mesh in the axes of ROS. Triangles of left-handed headset axes are reversed, and those without area
+    /// rejected.
     fn in_ros(
         &self,
         origin_from_surface: &Isometry3<f64>,
@@ -274,7 +276,7 @@ impl Surfaces {
         Ok((mesh, degenerate as u64))
     }
 
-    /// Puts a surface in the place of the one of its name, if it is not too large.
+    /// Inserts or replaces a surface within the bounds.
     fn insert(
         &mut self,
         name: &str,

@@ -1,4 +1,4 @@
-//! Label images that wait for the pose of their time.
+//! Queue of label images that wait for their pose.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -7,17 +7,17 @@ use lattice_msgs::sensor_msgs::Image;
 
 use crate::camera::LabelSet;
 
-/// A topic of images.
+/// Image topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeadsetStream {
-    /// Label images, whose stamps the clouds have.
+    /// Label images, whose stamps are those of the clouds.
     Labels,
-    /// Confidences, of exactly the stamp of a label image.
+    /// Confidence images, matched by the stamp of a label image.
     Confidence,
 }
 
 impl HeadsetStream {
-    /// Name under which it is counted.
+    /// Counter name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Labels => "labels",
@@ -26,22 +26,22 @@ impl HeadsetStream {
     }
 }
 
-/// Images of each topic by stamp, in bounded number.
+/// Bounded queue of images of each topic by stamp.
 #[derive(Default)]
 pub(super) struct Waiting {
     queues: [BTreeMap<i64, Arrived>; 2],
     arrivals: u64,
 }
 
-/// An image, and how many had come with it.
+/// An image with its arrival number.
 struct Arrived {
     number: u64,
     set: LabelSet,
 }
 
 impl Waiting {
-    /// Adds an image; gives how many of its topic leave for it: one of its stamp, and those that came first. Their
-    /// stamps may be those of a clock that was ahead.
+    /// Adds an image; returns the numbers of images of its topic dropped for it: one of its stamp, and the oldest. Age is
+    /// by arrival, since stamps may be of a clock that was ahead.
     pub fn push(
         &mut self,
         stream: HeadsetStream,
@@ -51,7 +51,7 @@ impl Waiting {
         self.push_set(stream, LabelSet::new(image), queue_size)
     }
 
-    /// Adds labels with what came with them, likewise.
+    /// Adds labels with companion images, with the same result.
     pub fn push_labels(&mut self, labels: LabelSet, queue_size: usize) -> [u64; 2] {
         self.push_set(HeadsetStream::Labels, labels, queue_size)
     }
@@ -74,7 +74,7 @@ impl Waiting {
         [u64::from(repeated), gone]
     }
 
-    /// Stamps of labels for which nothing but a pose may be missing, and the frames of their cameras.
+    /// Stamps and camera frames of labels that wait for at most a pose.
     pub fn ready(&self, with_confidence: bool) -> Vec<(i64, String)> {
         let [labels, confidences] = &self.queues;
         let is_whole = |stamp_ns: &i64| !with_confidence || confidences.contains_key(stamp_ns);
@@ -83,7 +83,7 @@ impl Waiting {
         ready.map(|(at, image)| (*at, frame(image))).collect()
     }
 
-    /// Takes the images of a stamp.
+    /// Removes the images of a stamp.
     pub fn take(&mut self, stamp_ns: i64) -> Option<LabelSet> {
         let [labels, confidences] = &mut self.queues;
         let mut set = labels.remove(&stamp_ns)?.set;
@@ -93,12 +93,12 @@ impl Waiting {
         Some(set)
     }
 
-    /// Forgets all images, and tells how many labels and confidences they were.
+    /// Drops all images; returns the numbers of labels and confidences.
     pub fn clear(&mut self) -> [u64; 2] {
         std::mem::take(&mut self.queues).map(|queue| queue.len() as u64)
     }
 
-    /// Images that wait.
+    /// Number of queued images.
     pub fn len(&self) -> usize {
         self.queues.iter().map(BTreeMap::len).sum()
     }

@@ -1,4 +1,4 @@
-//! The map kept over the end of its process: saved again and again while it changes, and gone on from.
+//! Automatic saves of a changing map, and resuming from the saved file.
 
 use std::io::ErrorKind;
 use std::thread::{self, JoinHandle};
@@ -11,10 +11,10 @@ use super::LatticeMapper;
 use super::map_folder::{MapFolder, Refusal};
 use crate::start::NodeError;
 
-/// Longest time between two saves.
+/// Longest settable period between saves.
 const MAX_PERIOD_S: f64 = 86_400.0;
 
-/// Place and period of the saves of a map, and if the node goes on from there.
+/// File and period of automatic saves, and whether the node resumes from the file.
 pub(super) struct AutosaveOptions {
     file: String,
     /// Zero: never.
@@ -34,25 +34,25 @@ impl AutosaveOptions {
     }
 }
 
-/// State of a map, as [`LatticeMapper::state`] gives it.
+/// State of a map as returned by [`LatticeMapper::state`].
 type State = (u64, u64);
 
-/// Saves of one map to one file.
+/// Automatic saves of one map to one file.
 pub(super) struct Autosave {
     maps: MapFolder,
     file: String,
     /// Zero: never.
     pub period: Duration,
-    /// State of the map that is saved.
+    /// State of the last saved map.
     saved: State,
     writing: Option<(JoinHandle<Result<(), Refusal>>, State)>,
-    /// Reason for which the last save failed.
+    /// Reason for the last failed save.
     failed: Option<String>,
     shutdown: Shutdown,
 }
 
 impl Autosave {
-    /// With `resume` the map of the file, if there is one, becomes the machine's.
+    /// Creates the saves; with `resume` the machine loads the map of an existing file.
     pub(super) fn start(
         options: AutosaveOptions,
         maps: &MapFolder,
@@ -74,7 +74,7 @@ impl Autosave {
         })
     }
 
-    /// Begins to save a map that has changed, unless it is still being saved.
+    /// Starts saving a changed map, unless a save is in progress.
     pub(super) fn save(&mut self, machine: &LatticeMapper) {
         let state = machine.state();
         self.look();
@@ -97,7 +97,7 @@ impl Autosave {
         }
     }
 
-    /// Saves what is not saved yet, and waits for that.
+    /// Saves unsaved changes and waits for completion.
     pub(super) fn finish(&mut self, machine: &LatticeMapper) {
         let _writing = self.shutdown.writing();
         self.wait();
@@ -105,13 +105,13 @@ impl Autosave {
         self.wait();
     }
 
-    /// Reason for which the newest map is not saved; none if all is well.
+    /// Reason why the newest map is not saved; `None` if it is.
     pub(super) fn problem(&self) -> Option<String> {
         let reason = self.failed.as_ref()?;
         Some(format!("the map is not saved: {reason}"))
     }
 
-    /// Takes note of a save that is done.
+    /// Handles a finished save.
     fn look(&mut self) {
         if self
             .writing
@@ -134,7 +134,7 @@ impl Autosave {
     }
 
     fn fail(&mut self, reason: String) {
-        // Once for a reason, not in each period.
+        // Logged once per reason, not in each period.
         if self.failed.as_ref() != Some(&reason) {
             log::error!("the map is not saved: {reason}");
         }
@@ -151,12 +151,12 @@ fn resume(
     let contents = match maps.read(file, max_voxels) {
         Ok(contents) => contents,
         Err(Refusal::Io(_, error)) if error.kind() == ErrorKind::NotFound => {
-            log::info!("no {file:?} to resume from: the map begins empty");
+            log::info!("{file:?} does not exist, so nothing is resumed: the map begins empty");
             return Ok(());
         }
         Err(refusal) => return Err(format!("cannot resume: {refusal}").into()),
     };
-    // Nobody has seen the epoch before.
+    // The epoch has not been published yet.
     let (epoch, _) = machine.state();
     let voxels = machine.load(contents, epoch);
     let voxels = voxels.map_err(|refusal| format!("cannot resume from {file:?}: {refusal}"))?;

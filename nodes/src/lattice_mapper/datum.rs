@@ -1,5 +1,5 @@
-//! Datum of a map whose parameters name none: in the middle of its first points, where those are far from the origin of
-//! the map frame, as coordinates of UTM and MGRS are.
+//! Automatic datum: the median of the first points, if those are far from the origin of
+//! the map frame, as with UTM and MGRS coordinates.
 
 use lattice_core::cloud::Cloud;
 use lattice_core::raycast::FreeSpaceError;
@@ -8,12 +8,12 @@ use nalgebra::Vector3;
 
 use super::{LatticeMapper, MapperOptions};
 
-/// Datums that are chosen are multiples of this, m.
+/// Automatic datums are multiples of this, m.
 const DATUM_TILE_M: f64 = 1024.0;
 
 impl LatticeMapper {
-    /// Moves the datum of a map that has no voxel yet to the middle of a cloud, where keys from the origin
-    /// would not reach as far again.
+    /// Moves the datum of an empty map to the median of a cloud, if the cloud is out of half
+    /// the range of keys from the origin.
     pub(super) fn choose_datum(&mut self, cloud: &Cloud) {
         let options = &self.options;
         let is_chosen = options.datum_is_given || options.datum_near_m != Vector3::zeros();
@@ -28,7 +28,7 @@ impl LatticeMapper {
         }
     }
 
-    /// Begins an empty map anew, with its datum near a place in the map frame.
+    /// Restarts an empty map with its datum near a position in the map frame.
     fn begin_at(&mut self, place_m: &Vector3<f64>) -> Result<(), FreeSpaceError> {
         let datum_near_m = place_m.map(|v| (v / DATUM_TILE_M).round() * DATUM_TILE_M);
         let options = MapperOptions {
@@ -61,7 +61,7 @@ impl LatticeMapper {
     }
 }
 
-/// Medians of the coordinates, which no stray point moves; `None` without finite points.
+/// Medians of the coordinates, robust to outliers; `None` without finite points.
 fn middle_m(cloud: &Cloud) -> Option<Vector3<f64>> {
     let points = (0..cloud.offsets_m.len()).map(|i| cloud.point_m(i));
     let points: Vec<_> = points.filter(|p| p.iter().all(|v| v.is_finite())).collect();

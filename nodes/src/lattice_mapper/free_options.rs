@@ -1,38 +1,38 @@
-//! Parameters of free space in the mapper.
+//! Free space parameters of the mapper.
 
 use crate::options::one_of;
 use lattice_core::raycast::{ClearOptions, Evidence, MAX_FREE_LEVEL, MIN_MAP_BYTES, Reach};
 use lattice_runtime::params::{ParamError, Params};
 
-/// Longest ray and kept end, m.
+/// Largest settable ray length and kept end, m.
 const MAX_LENGTH_M: f64 = 1e6;
-/// Longest sweep, s.
+/// Largest settable sweep duration, s.
 const MAX_SWEEP_S: f64 = 60.0;
 
 /// Use of the rays from the sensor to its points.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum FreeSpaceMethod {
-    /// None: voxels stay.
+    /// Rays are ignored.
     #[default]
     Off,
-    /// Voxels that rays pass through go.
+    /// Rays clear the voxels that they traverse.
     Clear,
-    /// Hits and misses of each cell are counted; voxels that are probably free go.
+    /// Hits and misses of each cell are counted; voxels that are probably free are removed.
     Evidence,
 }
 
-/// Options of free space in a map.
+/// Free space options of a map.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct MappedFreeSpace {
-    /// Use of the rays.
+    /// Method.
     pub method: FreeSpaceMethod,
-    /// Clouds of this long are one scan, ns; 0: each is one.
+    /// Duration of the clouds of one scan, ns; 0: each cloud is a scan.
     pub sweep_ns: i64,
     /// Range, kept ends, misses and memory; evidence uses all but the misses.
     pub clear: ClearOptions,
-    /// Hits and misses that make a cell occupied or free.
+    /// Evidence model of hits and misses.
     pub evidence: Evidence,
-    /// Free cells that are published are `2^free_level` as wide; 0: none are.
+    /// Level of published free cells, `2^free_level` voxels wide; 0: not published.
     pub free_level: u32,
 }
 

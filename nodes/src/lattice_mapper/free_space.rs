@@ -1,7 +1,7 @@
-//! Free space in the mapper: rays from the sensor to its points clear what stood there before.
+//! Free space in the mapper: rays from the sensor to its points clear voxels of removed objects.
 //!
-//! Clouds of a sweep are one scan: a cell that any of them hits is not cleared by the others, and it
-//! has one ray. So a planar laser on a turntable sees as a scanner that spins.
+//! The clouds of a sweep are one scan: a cell hit by any of them is not cleared by the others, and it
+//! has one ray. A planar laser on a turntable then acts like a spinning scanner.
 
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, MortonKey};
@@ -14,10 +14,10 @@ use rustc_hash::FxHashMap;
 
 use super::free_options::{FreeSpaceMethod, MappedFreeSpace};
 
-/// Most places from which one sweep is seen; points seen from others give no rays.
+/// Limit of viewpoints of one sweep; points of others have no rays.
 const MAX_BUNDLES: usize = 4096;
 
-/// Rays and what they say of the cells of a map.
+/// Rays of a sweep, and their evidence on the cells of a map.
 pub(super) struct FreeSpace {
     method: Method,
     sweep_ns: i64,
@@ -30,7 +30,7 @@ enum Method {
     Evidence(Box<FreeSpaceMap>),
 }
 
-/// Points since the first cloud of the sweep, by the cell that they were seen from.
+/// Points of the current sweep, by the cell of their viewpoint.
 #[derive(Default)]
 struct Sweep {
     start_ns: Option<i64>,
@@ -72,13 +72,13 @@ impl FreeSpace {
         }))
     }
 
-    /// Goes on with other options, except for method, memory and free level.
+    /// Changes the options, except method, memory and free level.
     pub(super) fn set_options(&mut self, options: &MappedFreeSpace, max_points: usize) {
         (self.sweep_ns, self.max_points) = (options.sweep_ns, max_points);
         match &mut self.method {
             Method::Clear(clearer) => clearer.set_options(options.clear),
             Method::Evidence(map) => {
-                // They were checked when they were read.
+                // Validated when the parameters were read.
                 if let Err(error) = map.set_weights(options.evidence, options.clear.reach) {
                     log::error!("{error}");
                 }
@@ -86,20 +86,20 @@ impl FreeSpace {
         }
     }
 
-    /// True if a cloud of this time begins another sweep, so that this one is to be cleared before
+    /// True if a cloud of this stamp begins another sweep, so that this one is to be cleared before
     /// its points are inserted.
     pub(super) fn is_complete(&self, stamp_ns: i64) -> bool {
         let Some(start_ns) = self.sweep.start_ns else {
             return false;
         };
         let since_ns = stamp_ns.saturating_sub(start_ns);
-        // In a log that is played again, time goes back.
+        // Time goes back when a log is replayed.
         since_ns >= self.sweep_ns
             || since_ns < -self.sweep_ns
             || self.sweep.points > self.max_points
     }
 
-    /// Adds a cloud whose points are in `store` already.
+    /// Adds a cloud whose points are already in `store`.
     pub(super) fn add(
         &mut self,
         store: &dyn VoxelStore,
@@ -115,7 +115,7 @@ impl FreeSpace {
         self.sweep_ns == 0
     }
 
-    /// Ends the sweep: its rays clear.
+    /// Ends the sweep and clears along its rays.
     pub(super) fn clear(&mut self, store: &mut dyn VoxelStore) -> ClearReport {
         let sweep = std::mem::take(&mut self.sweep);
         let bundles = sweep.bundles.iter();
@@ -132,7 +132,7 @@ impl FreeSpace {
         }
     }
 
-    /// Forgets all rays; `known` cells count as hit once.
+    /// Drops all rays; `known` cells count as hit once.
     pub(super) fn restart(&mut self, known: &dyn VoxelStore) {
         self.sweep = Sweep::default();
         if let Method::Evidence(map) = &mut self.method {
@@ -143,7 +143,7 @@ impl FreeSpace {
         }
     }
 
-    /// Lattice and free cells of it, where they are kept.
+    /// Lattice and free cells, if they are kept.
     pub(super) fn free_cells(&self) -> Option<(&Lattice, Vec<MortonKey>)> {
         match &self.method {
             Method::Evidence(map) if map.options().free_level.is_some() => {
@@ -176,7 +176,7 @@ impl Sweep {
         }
     }
 
-    /// The bundle of a viewpoint: that of the first one in the same cell.
+    /// Bundle of a viewpoint: that of the first viewpoint in the same cell.
     fn bundle_at(
         &mut self,
         store: &dyn VoxelStore,

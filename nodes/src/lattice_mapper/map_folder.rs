@@ -1,4 +1,4 @@
-//! The folder `map_dir`: map files that anybody on the network may name, and nothing else of the machine.
+//! The folder `map_dir`: access for remote clients is restricted to its map files.
 
 use std::fs::{self, File};
 use std::io::{self, BufReader, ErrorKind, Read, Seek};
@@ -13,23 +13,23 @@ use lattice_runtime::params::{ParamError, Params};
 use rustix::fs::{Mode, OFlags, open};
 use thiserror::Error;
 
-use crate::files::whole::WholeFile;
+use crate::files::atomic_write::AtomicFile;
 
-/// Level that costs little time.
+/// Fast compression level.
 const ZSTD_LEVEL: i32 = 3;
 
-/// Error of reading or writing a map file, by the name that was asked for.
+/// Reason for rejecting a map file, with the requested name.
 #[derive(Debug, Error)]
 pub(super) enum Refusal {
     #[error(
-        "{0:?} is no name below `map_dir`: neither absolute paths nor `..`, links and hidden files"
+        "{0:?} is not a name below `map_dir`: absolute paths, `..`, links and hidden files are not allowed"
     )]
     Name(String),
     #[error("{0:?} is not a regular file")]
     NotAFile(String),
     #[error("{0:?} is not a map file")]
     NotAMap(String),
-    #[error("{0:?} is there and not a map file: it is not replaced")]
+    #[error("{0:?} exists and is not a map file: it is not replaced")]
     NotOurs(String),
     #[error("{0:?}: {1}")]
     Io(String, io::Error),
@@ -37,7 +37,7 @@ pub(super) enum Refusal {
     Format(String, FileError),
 }
 
-/// The folder, and the names of labels that go into its maps; clones are of the same.
+/// The folder, and the label names written into its maps; clones share them.
 #[derive(Clone)]
 pub(super) struct MapFolder {
     folder: Arc<Path>,
@@ -45,7 +45,7 @@ pub(super) struct MapFolder {
 }
 
 impl MapFolder {
-    /// The folder of a path, which must be there.
+    /// Opens an existing folder.
     pub(super) fn new(path: &str) -> io::Result<Self> {
         let folder = fs::canonicalize(path)?;
         match folder.is_dir() {
@@ -77,21 +77,21 @@ impl MapFolder {
         file.rewind().map_err(io)?;
         let read = read_label_names(BufReader::new(file)).map_err(format)?;
         let mut names = lock(&self.names);
-        // What `label_info` has named since is newer.
+        // Names from `label_info` are newer.
         for (label, name) in read {
             names.entry(label).or_insert(name);
         }
         Ok(contents)
     }
 
-    /// Takes names of labels for the maps that are written from now on.
+    /// Sets label names for the maps written from now on.
     pub(super) fn name_labels(&self, info: &LabelInfo) {
         let classes = info.class_map.iter();
         let named = classes.map(|class| (class.class_id, short_name(&class.class_name).to_owned()));
         lock(&self.names).extend(named);
     }
 
-    /// Writes a map, in place of an earlier one but of nothing else.
+    /// Writes a map; an existing file is replaced only if it is a map.
     pub(super) fn write(&self, name: &str, contents: &MapContents) -> Result<(), Refusal> {
         let path = self.place(name)?;
         match regular_file(name, &path) {
@@ -108,7 +108,7 @@ impl MapFolder {
             zstd_level: Some(ZSTD_LEVEL),
             ..WriteOptions::default()
         };
-        let mut file = WholeFile::create(&path).map_err(io)?;
+        let mut file = AtomicFile::create(&path).map_err(io)?;
         let names = match contents.payload().labels {
             true => lock(&self.names).clone(),
             false => LabelNames::new(),
@@ -118,7 +118,7 @@ impl MapFolder {
         file.finish().map_err(io)
     }
 
-    /// The path of a name; no folder on the way is a link.
+    /// Path of a name; no folder on the way may be a link.
     fn place(&self, name: &str) -> Result<PathBuf, Refusal> {
         let refusal = || Refusal::Name(name.to_owned());
         let mut path = self.folder.to_path_buf();
@@ -141,7 +141,7 @@ impl MapFolder {
     }
 }
 
-/// Opens a file; neither a link nor a pipe keeps the thread.
+/// Opens a regular file; links and pipes are rejected without blocking.
 fn regular_file(name: &str, path: &Path) -> Result<impl Read + Seek + use<>, Refusal> {
     let io = |error| Refusal::Io(name.to_owned(), error);
     let flags = OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::CLOEXEC;

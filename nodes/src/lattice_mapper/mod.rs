@@ -1,6 +1,6 @@
-//! The map: clouds in the map frame become an occupied voxel list on a lattice.
+//! `lattice_mapper`: quantizes clouds of the map frame into an occupied voxel list on a lattice.
 //!
-//! [`LatticeMapper`] is a state machine without I/O; [`node`] runs it behind DDS.
+//! [`LatticeMapper`] is a state machine without I/O; [`node`] connects it to DDS.
 
 mod autosave;
 mod counts;
@@ -45,7 +45,7 @@ use self::occupancy::OccupancyMap;
 use crate::convert::{cloud, geometry, map, semantic, viewpoint};
 use crate::stamps::StampGate;
 
-/// Builds one occupied voxel list, with its changes for followers.
+/// Builds one occupied voxel list, and its updates for followers.
 pub struct LatticeMapper {
     options: MapperOptions,
     /// Empty with [`MapPayload::Occupancy`].
@@ -58,20 +58,20 @@ pub struct LatticeMapper {
     history: map::History,
     origin: Option<GeoPoint>,
     last_stamp_ns: i64,
-    /// Set if voxels grow old.
+    /// Present if voxels expire.
     stamps: Option<StampGate>,
-    /// Stamp at which old voxels were last looked for.
+    /// Stamp of the last removal of expired voxels.
     forgot_at_ns: i64,
     counts: MapperCounts,
-    /// For queries, made when the first one comes.
+    /// Search shells for queries, created at the first one.
     shells: OnceLock<Arc<Shells>>,
 }
 
 impl LatticeMapper {
-    /// An empty map. `epoch` tells this map from earlier ones on the same topic.
+    /// Creates an empty map. `epoch` distinguishes it from earlier maps on the same topic.
     ///
-    /// Refused when the datum is not a place that the lattice reaches, or when the options of free
-    /// space do not go together.
+    /// Fails if the datum is out of the lattice's range, or if the free space options
+    /// are inconsistent.
     pub fn new(options: MapperOptions, epoch: u64) -> Result<Self, FreeSpaceError> {
         let (lattice, near_m) = (options.lattice.clone(), options.datum_near_m);
         let max_voxels = options.voxel_limit();
@@ -99,7 +99,7 @@ impl LatticeMapper {
         })
     }
 
-    /// Goes on with other options; those that the map is made with stay as they are.
+    /// Changes the options, except those that the map was created with.
     pub fn set_options(&mut self, options: MapperOptions) {
         let max_voxels = options.voxel_limit();
         self.list.set_bound(max_voxels, options.when_full);
@@ -115,7 +115,7 @@ impl LatticeMapper {
         self.options = options;
     }
 
-    /// Takes the geodetic origin of the map frame, which the map carries along.
+    /// Sets the geodetic origin of the map frame, which map messages include.
     pub fn on_origin(&mut self, origin: &GeoPointStamped) {
         self.origin = Some(origin.position);
     }
@@ -137,10 +137,10 @@ impl LatticeMapper {
         let cloud = cloud::cloud_from_message(message, &limits, &self.list.datum_m())
             .inspect_err(|_| self.counts.clouds_malformed += 1)?;
         self.choose_datum(&cloud);
-        // All that can be refused is read before any voxel changes.
+        // Everything that can be rejected is read before any voxel changes.
         let labels = self.labels_of(message)?;
         let viewpoints = self.viewpoints_of(message, &limits)?;
-        // The first stamp is held against nothing: by that alone nothing grows old.
+        // The first stamp has no reference: nothing expires by it.
         let ages = (self.stamps.as_ref()).is_some_and(|stamps| !stamps.is_new());
         let stamp_ns = cloud.stamp_ns;
         if (self.stamps.as_mut()).is_some_and(|stamps| !stamps.passes(stamp_ns)) {
@@ -169,7 +169,7 @@ impl LatticeMapper {
         Ok(())
     }
 
-    /// Labels of the points, none at all for a cloud without them; `None` where labels are not kept.
+    /// Labels of the points, empty for a cloud without them; `None` if labels are not kept.
     fn labels_of(&mut self, message: &PointCloud2) -> Result<Option<Vec<u16>>, CloudRefusal> {
         let (Some(options), None) = (&self.options.labels, &self.occupancy) else {
             return Ok(None);
@@ -181,7 +181,7 @@ impl LatticeMapper {
         Ok(Some(labels.unwrap_or_default()))
     }
 
-    /// Places of the sensor for each point; `None` where free space is off or the cloud has none.
+    /// Viewpoint of each point; `None` if free space is off or the cloud has none.
     fn viewpoints_of(
         &mut self,
         message: &PointCloud2,
@@ -220,10 +220,10 @@ impl LatticeMapper {
         }
     }
 
-    /// Removes the voxels that are too old, whenever a sixteenth of their age has passed.
+    /// Removes expired voxels, each time a sixteenth of their age limit has passed.
     fn forget_old(&mut self) {
         let (age, now) = (self.options.forget_after_ns, self.last_stamp_ns);
-        // In a log that is played again, time goes back.
+        // Time goes back when a log is replayed.
         if age == 0 || now.abs_diff(self.forgot_at_ns) < age.unsigned_abs() / 16 {
             return;
         }
@@ -232,7 +232,7 @@ impl LatticeMapper {
         self.counts.voxels_forgotten += forgotten.unwrap_or(0) as u64;
     }
 
-    /// Forgets all voxels and begins a new epoch.
+    /// Removes all voxels and begins a new epoch.
     pub fn reset(&mut self, epoch: u64) {
         self.list.clear();
         if let Some(occupancy) = &mut self.occupancy {
@@ -242,7 +242,7 @@ impl LatticeMapper {
     }
 
     fn begin(&mut self, epoch: u64) {
-        // Followers learn of the removal by the epoch.
+        // The new epoch implies the removal.
         self.take_changes();
         if let Some(free_space) = &mut self.free_space {
             match &self.occupancy {
@@ -258,7 +258,7 @@ impl LatticeMapper {
         self.forgot_at_ns = 0;
     }
 
-    /// Epoch and state of the list: a copy of the map is old once they differ.
+    /// Epoch and sequence of the list: a copy of the map is outdated once they differ.
     pub fn state(&self) -> (u64, u64) {
         let sequence = match &self.occupancy {
             Some(occupancy) => occupancy.sequence(),
@@ -274,7 +274,7 @@ impl LatticeMapper {
         }
     }
 
-    /// The changes since the update before, as one step of the sequence; empty when there are none.
+    /// Changes since the last update, as one step of the sequence; empty when there are none.
     pub fn take_update(&mut self) -> Vec<LatticeMapUpdate> {
         let changes = self.take_changes();
         if changes.changed.is_empty() && changes.removed.is_empty() {
@@ -297,8 +297,8 @@ impl LatticeMapper {
 
     /// The whole map in self-contained chunks.
     ///
-    /// It may hold changes that the next update brings again: updates carry states, not
-    /// differences, so taking both is harmless.
+    /// It may contain changes that the next update repeats: updates carry states, not
+    /// differences, so applying both is harmless.
     pub fn keyframe(&mut self) -> Vec<LatticeMap> {
         self.counts.keyframes += 1;
         let stamp = self.stamp();
@@ -311,7 +311,7 @@ impl LatticeMapper {
         }
     }
 
-    /// The free cells in self-contained chunks, as those of a map; `None` where none are kept.
+    /// Free cells in self-contained chunks like those of a map; `None` if none are kept.
     pub fn free(&self) -> Option<Vec<LatticeMap>> {
         let (lattice, keys) = self.free_space.as_ref()?.free_cells()?;
         let datum_m = self.list.datum_m();
@@ -320,7 +320,7 @@ impl LatticeMapper {
     }
 
     /// Cell centres in the map frame, with the number of points (1 if not kept) as `intensity` and,
-    /// where labels are kept, the most frequent one as `label`.
+    /// if labels are kept, the most frequent one as `label`.
     pub fn centers(&self) -> PointCloud2 {
         let voxels: Vec<(MortonKey, u32)> = match &self.occupancy {
             Some(cells) => (cells.sorted_keys().into_iter())

@@ -1,4 +1,4 @@
-//! The mapper as a ROS node: a thin shell around [`LatticeMapper`].
+//! ROS node around [`LatticeMapper`].
 
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, Once};
@@ -24,9 +24,9 @@ use crate::report;
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Losses, Runtime, WORKING, lock};
+use lattice_runtime::{Diagnostics, Level, Losses, Runtime, SubscriptionExecutor, WORKING, lock};
 
-/// Said where rays shall clear voxels and a cloud does not say where they begin.
+/// Warning for clouds without viewpoints while free space is on.
 const NO_VIEWPOINTS: &str = "no sensor positions (vp_x, vp_y, vp_z), so no free space: set `viewpoints: true` of enu_transformer";
 
 /// Event for the compute thread.
@@ -50,7 +50,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let (maps, old) = (settings.maps, settings.mapper.clone());
     let lost = Arc::new(AtomicU64::new(0));
     let (clouds, inputs) = (Losses::default(), Losses::default());
-    let wishes = Arc::new(Wishes::default());
+    let update_requests = Arc::new(UpdateRequests::default());
     let max_voxels = Arc::new(AtomicUsize::new(old.voxel_limit()));
     let mut machine = LatticeMapper::new(settings.mapper, epoch())?;
     let (output, requests) = MapOutput::open(&node)?;
@@ -62,7 +62,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         runtime.shutdown_handle(),
     )?;
     let autosave_period = autosave.period;
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         machine,
         autosave,
         output,
@@ -74,34 +74,49 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         inputs: inputs.clone(),
         refusals: Throttle::new(Duration::from_secs(5)),
         no_viewpoints: Once::new(),
-        wishes: Arc::clone(&wishes),
+        update_requests: Arc::clone(&update_requests),
         writing: None,
         maps: maps.clone(),
         centers_of: None,
         report_file: settings.report_file,
     };
-    let centers = shell.outputs.centers.clone();
+    let centers = compute_state.outputs.centers.clone();
     let compute = Compute::spawn(
         name,
         settings.limits,
         runtime.shutdown_handle(),
-        move |event| shell.on(event),
+        move |event| compute_state.on(event),
     )?;
     let inbox = compute.inbox();
     let hand_over = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
-    let points = node.subscribe("points_enu", Qos::SCANS, Load::Large, hand_over)?;
-    let origins = Arc::clone(&wishes);
+    let points = node.subscribe(
+        "points_enu",
+        Qos::SCANS,
+        SubscriptionExecutor::Dedicated,
+        hand_over,
+    )?;
+    let origins = Arc::clone(&update_requests);
     let take = move |origin| *lock(&origins.origin) = Some(origin);
-    let origins = node.subscribe("map_origin", Qos::LATCHED, Load::Small, take)?;
+    let origins = node.subscribe(
+        "map_origin",
+        Qos::LATCHED,
+        SubscriptionExecutor::Shared,
+        take,
+    )?;
     let names = match old.payload().labels {
         true => {
             let maps = maps.clone();
             let take = move |info: Arc<LabelInfo>| maps.name_labels(&info);
-            Some(node.subscribe("label_info", Qos::LATCHED, Load::Small, take)?)
+            Some(node.subscribe(
+                "label_info",
+                Qos::LATCHED,
+                SubscriptionExecutor::Shared,
+                take,
+            )?)
         }
         false => None,
     };
-    centers.on_subscriber_joined(move || wishes.centers.store(true, Ordering::Relaxed));
+    centers.on_subscriber_joined(move || update_requests.centers.store(true, Ordering::Relaxed));
     let services = inbox.clone();
     let mut more = Vec::new();
     match settings.octomap_services {
@@ -149,14 +164,14 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// Requests for the next update, kept whatever waits in the inbox.
+/// Requests for the next update, kept independently of the inbox.
 #[derive(Default)]
-struct Wishes {
+struct UpdateRequests {
     centers: AtomicBool,
     origin: Mutex<Option<Arc<GeoPointStamped>>>,
 }
 
-/// Hands over a timer's event; one that finds no room comes again with the next.
+/// Sends a timer event; one rejected by a full inbox is repeated at the next period.
 fn notify(inbox: &Inbox<Event>, event: Event) {
     if !inbox.send(event, 0) {
         log::debug!("the inbox is full");
@@ -164,32 +179,32 @@ fn notify(inbox: &Inbox<Event>, event: Event) {
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     machine: LatticeMapper,
     autosave: Autosave,
     output: MapOutput,
     outputs: Outputs,
     diagnostics: Diagnostics,
-    /// Until there is a map.
+    /// Present until there is a map.
     unmapped: Option<Unmapped>,
-    /// Clouds that found the inbox full.
+    /// Clouds rejected by a full inbox.
     lost: Arc<AtomicU64>,
-    /// Losses before it: of clouds, and of all inputs.
+    /// Losses before the inbox: of clouds, and of all inputs.
     clouds: Losses,
     inputs: Losses,
     refusals: Throttle,
     no_viewpoints: Once,
-    wishes: Arc<Wishes>,
-    /// A map file on its way to the disk.
+    update_requests: Arc<UpdateRequests>,
+    /// Thread that writes a map file.
     writing: Option<JoinHandle<()>>,
-    /// Place of map files.
+    /// Folder of map files.
     maps: MapFolder,
-    /// State of the map that the last centres are of.
+    /// State of the last published centres.
     centers_of: Option<(u64, u64)>,
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Cloud(cloud) => {
@@ -229,9 +244,9 @@ impl Shell {
         }
     }
 
-    /// Publishes what changed, and a keyframe where one was asked for or an update was lost.
+    /// Publishes an update, and a keyframe on request or after a lost update.
     fn update(&mut self) {
-        if let Some(origin) = lock(&self.wishes.origin).take() {
+        if let Some(origin) = lock(&self.update_requests.origin).take() {
             self.machine.on_origin(&origin);
         }
         let update = self.machine.take_update();
@@ -241,7 +256,7 @@ impl Shell {
 
     fn centers(&mut self) {
         let state = self.machine.state();
-        let asked = self.wishes.centers.swap(false, Ordering::Relaxed);
+        let asked = self.update_requests.centers.swap(false, Ordering::Relaxed);
         let listened = self.outputs.centers.subscriber_count() > 0;
         if !listened || (!asked && self.centers_of == Some(state)) {
             return;
@@ -252,7 +267,7 @@ impl Shell {
         }
     }
 
-    /// Publishes all free cells; one that joins later has them with the next time.
+    /// Publishes all free cells; late joiners receive the next message.
     fn free(&mut self) {
         let Some(publisher) = &self.outputs.free else {
             return;
@@ -279,7 +294,7 @@ impl Shell {
         }
     }
 
-    /// Clouds that found the inbox, or the queue before it, full.
+    /// Clouds rejected by a full inbox or overrun before it.
     fn clouds_inbox_full(&self) -> u64 {
         self.lost.load(Ordering::Relaxed) + self.clouds.overrun()
     }
@@ -309,10 +324,11 @@ impl Shell {
             let clouds = counts.clouds_no_viewpoint;
             (Level::Warn, format!("{clouds} clouds: {NO_VIEWPOINTS}"))
         } else if counts.ray_blocks_refused > 0 {
-            let problem = "rays have no room (`rays.max_bytes`): not all voxels are cleared";
+            let problem =
+                "the memory for rays is full (`rays.max_bytes`): not all voxels are cleared";
             (Level::Warn, problem.to_owned())
         } else if refused + lost > 0 {
-            let message = format!("{refused} clouds refused, {lost} lost");
+            let message = format!("{refused} clouds rejected, {lost} lost");
             (Level::Warn, message)
         } else if not_published > 0 {
             let message = format!("{not_published} parts of the map not published");
@@ -352,12 +368,12 @@ impl Shell {
             self.update();
         }
         self.centers();
-        // What is not sent by then counts.
+        // Messages not sent by then count as lost.
         self.output.flush();
         let (clouds, voxels) = (self.machine.counts().clouds_in, self.machine.cells().len());
         let points = self.machine.distortion().points;
         log::info!("{clouds} clouds, {points} points in {voxels} voxels");
-        // The report counts the bytes of a keyframe, which a map of millions of voxels takes seconds for.
+        // Only computed for a report: a keyframe of millions of voxels takes seconds.
         if self.report_file.is_empty() {
             return;
         }

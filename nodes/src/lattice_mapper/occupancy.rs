@@ -1,4 +1,4 @@
-//! A map of `payload: occupancy`: one bit for each voxel, and what changed since the last update.
+//! Map with `payload: occupancy`: one bit per voxel, and the changes since the last update.
 
 use std::collections::hash_map::Entry;
 
@@ -8,19 +8,19 @@ use lattice_core::voxels::{Changes, InsertReport, OccupancyList, Region, VoxelSt
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
-/// Occupied cells with a record of changes.
+/// Occupied cells with a change record.
 pub(super) struct OccupancyMap {
     list: OccupancyList,
-    /// Cells of one cloud; kept to save the allocation.
+    /// Cells of one cloud; kept to reuse the allocation.
     cloud: OccupancyList,
     max_voxels: usize,
-    /// Cells that differ from the state of the last update: true if occupied since, false if free.
+    /// Cells that differ from the last update: true if occupied since, false if freed.
     changes: FxHashMap<MortonKey, bool>,
     sequence: u64,
 }
 
 impl OccupancyMap {
-    /// An empty map for the lattice and datum of `store`; `max_bytes` 0: no limit but `max_voxels`.
+    /// Empty map for the lattice and datum of `store`; `max_bytes` 0: limited by `max_voxels` only.
     pub(super) fn new(store: &dyn VoxelStore, max_voxels: usize, max_bytes: usize) -> Self {
         let max_bytes = if max_bytes == 0 {
             usize::MAX
@@ -38,17 +38,17 @@ impl OccupancyMap {
         }
     }
 
-    /// Number of the state: every change makes the next one.
+    /// Sequence of the state, incremented by every change.
     pub(super) fn sequence(&self) -> u64 {
         self.sequence
     }
 
-    /// Bounds the voxels from now on.
+    /// Changes the voxel limit.
     pub(super) fn set_max_voxels(&mut self, max_voxels: usize) {
         self.max_voxels = max_voxels;
     }
 
-    /// Most memory, bytes.
+    /// Memory limit, bytes.
     pub(super) fn max_bytes(&self) -> usize {
         self.list.max_bytes()
     }
@@ -65,7 +65,7 @@ impl OccupancyMap {
         self.sequence += 1;
     }
 
-    /// Changes since the call before, sorted.
+    /// Sorted changes since the last call.
     pub(super) fn take_changes(&mut self) -> Changes {
         let mut changes = Changes::default();
         for (key, occupied) in self.changes.drain() {
@@ -80,10 +80,10 @@ impl OccupancyMap {
         changes
     }
 
-    /// Notes that a cell was free and is occupied, or the other way round.
+    /// Records that a cell became occupied or free.
     fn note(&mut self, key: MortonKey, occupied: bool) {
         match self.changes.entry(key) {
-            // Back to what the last update said.
+            // Back to the state of the last update.
             Entry::Occupied(entry) if *entry.get() != occupied => {
                 entry.remove();
             }

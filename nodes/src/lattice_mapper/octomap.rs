@@ -1,4 +1,4 @@
-//! Services of octomap_server, for clients that know only those; `docs/octomap.md` tells what else there is.
+//! Services of octomap_server for its clients; `docs/octomap.md` lists further compatibility.
 
 use lattice_msgs::lattice::ClearBoxRequest;
 use lattice_msgs::octomap_msgs::BoundingBoxQuery;
@@ -8,8 +8,8 @@ use super::services::Call;
 use crate::compute::Inbox;
 use lattice_runtime::{Node, RuntimeError, Server};
 
-/// Serves `~/clear_bbox` and `~/reset` with their types. A full inbox leaves the map as it is, which they
-/// have no words for: it is a warning.
+/// Serves `~/clear_bbox` and `~/reset` with their types. Their replies cannot report a full inbox, which
+/// leaves the map unchanged: it is logged.
 pub(super) fn serve<E: Send + 'static>(
     node: &Node,
     inbox: &Inbox<E>,
@@ -25,7 +25,7 @@ pub(super) fn serve<E: Send + 'static>(
                 wrap(Call::ClearBoundingBox(ClearBoxRequest { min, max }, reply)),
                 0,
             ) {
-                log::warn!("busy: a box is not cleared");
+                log::warn!("the inbox is full: the box is not cleared");
                 busy.send(Default::default());
             }
         })
@@ -33,7 +33,7 @@ pub(super) fn serve<E: Send + 'static>(
     let to = inbox.clone();
     let emptied = node.service::<Empty>("~/reset", move |_| {
         if !to.send(reset(), 0) {
-            log::warn!("busy: the map is not emptied");
+            log::warn!("the inbox is full: the map is not reset");
         }
         EmptyResponse::default()
     })?;

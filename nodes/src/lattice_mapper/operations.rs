@@ -1,4 +1,4 @@
-//! Operations that services ask for: load, clear a box, query.
+//! Map operations of services: load, clear a box, query.
 
 use std::sync::Arc;
 
@@ -12,12 +12,12 @@ use thiserror::Error;
 
 use super::LatticeMapper;
 
-/// Reason for which a map was not loaded. The mapper's is as it was before.
+/// Reason why a map was not loaded. The current map is unchanged.
 #[derive(Debug, Error)]
 pub enum LoadRefusal {
-    /// Of other cells than those of the parameters.
+    /// Lattice other than that of the parameters.
     #[error(
-        "the file is of {theirs}, this node maps on {ours}: set `lattice` and `cell_volume_m3`"
+        "the file has the lattice {theirs}, this node {ours}: set `lattice` and `cell_volume_m3`"
     )]
     Lattice {
         /// The lattice of the mapper.
@@ -25,14 +25,14 @@ pub enum LoadRefusal {
         /// The lattice of the file.
         theirs: String,
     },
-    /// A cell is too far from the mapper's datum.
+    /// Cell too far from the mapper's datum.
     #[error(transparent)]
     Datum(#[from] OperationError),
-    /// Old voxels are to be forgotten, but these have no stamps.
+    /// Voxels without stamps, where they are to expire.
     #[error("the file has no stamps, which `forget_after_s` needs: save it where that is set")]
     Stamps,
-    /// More voxels than the mapper may keep.
-    #[error("the file has {voxels} voxels, but at most {max_voxels} are allowed")]
+    /// Voxel count above the limit.
+    #[error("the file has {voxels} voxels, more than `max_voxels` {max_voxels}")]
     TooMany {
         /// Voxels of the file.
         voxels: usize,
@@ -42,7 +42,7 @@ pub enum LoadRefusal {
 }
 
 impl LatticeMapper {
-    /// A copy of the map as a file holds it.
+    /// Copy of the map as file contents.
     pub fn contents(&self) -> MapContents {
         match &self.occupancy {
             Some(occupancy) => MapContents::from_store(occupancy),
@@ -50,8 +50,8 @@ impl LatticeMapper {
         }
     }
 
-    /// Replaces the map and begins a new epoch, as [`LatticeMapper::reset`] does; gives the number
-    /// of voxels. The lattice must be the mapper's; keys are counted anew from its datum.
+    /// Replaces the map and begins a new epoch, as [`LatticeMapper::reset`] does; returns the number
+    /// of voxels. The lattice must be the mapper's; keys are converted to its datum.
     pub fn load(&mut self, contents: MapContents, epoch: u64) -> Result<usize, LoadRefusal> {
         let (lattice, payload) = (&self.options.lattice, self.options.payload());
         if contents.lattice() != lattice {
@@ -104,7 +104,7 @@ impl LatticeMapper {
         }
     }
 
-    /// Says what is occupied around a point.
+    /// Queries occupancy around a point.
     pub fn query(&self, request: &QueryMapRequest) -> QueryMapResponse {
         self.ask(&vector(&request.point))
             .unwrap_or_else(|error| QueryMapResponse {

@@ -15,44 +15,44 @@ use lattice_runtime::params::{ParamError, Params};
 pub struct MapperOptions {
     /// Lattice, cell volume and orientation.
     pub lattice: Lattice,
-    /// Frame that clouds must be in and that the map is in.
+    /// Frame of the map, required of clouds.
     pub map_frame: String,
-    /// Place in the map frame near which voxel keys are counted from, in metres.
+    /// Position in the map frame near the datum, metres.
     pub datum_near_m: Vector3<f64>,
-    /// True if keys are counted from that place however far the points are; else from a place near the first
-    /// of them where that is out of reach.
+    /// True if this position is used for any points; otherwise it is replaced by a position near the first
+    /// points if those are out of range.
     pub datum_is_given: bool,
-    /// Most voxels kept.
+    /// Voxel limit.
     pub max_voxels: usize,
-    /// Most memory for voxels, which may allow fewer than `max_voxels`; 0: as many as those take.
+    /// Memory limit for voxels, which may be reached before `max_voxels`; 0: none.
     pub max_map_bytes: usize,
-    /// Treatment of points in new cells when the map is full.
+    /// Policy for points in new cells of a full map.
     pub when_full: WhenFull,
-    /// Age in the time of the clouds at which a voxel goes, ns; 0: never. Needs stamps of all voxels.
+    /// Age limit of a voxel by the stamps of clouds, ns; 0: none. Requires stamps of all voxels.
     pub forget_after_ns: i64,
-    /// Most points of one cloud.
+    /// Limit of points per cloud.
     pub max_cloud_points: usize,
-    /// Reading of labels, which are counted in each voxel; none: they are not kept.
+    /// Label conversion for label counts in each voxel; `None`: labels are not kept.
     pub labels: Option<LabelOptions>,
-    /// Largest serialised message of `map`, `map_updates` and `free`.
+    /// Largest serialized message of `map`, `map_updates` and `free`, bytes.
     pub chunk_bytes: usize,
-    /// Content of a voxel: one bit, or count and mean point.
+    /// Payload of a voxel: one bit, or count and mean point.
     pub payload: MapPayload,
-    /// Rays that clear voxels.
+    /// Free space options.
     pub free_space: MappedFreeSpace,
 }
 
 const SECOND_NS: i64 = 1_000_000_000;
-/// Clouds in a row whose stamps agree on another time before it is believed.
+/// Consecutive clouds whose stamps must agree on another time before it is accepted.
 const AGREEING_CLOUDS: u32 = 5;
 
-/// Contents of a voxel.
+/// Payload of voxels.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum MapPayload {
-    /// Count and mean of the points, and stamps or labels where asked for.
+    /// Count and mean of the points, with optional stamps or labels.
     #[default]
     Centroid,
-    /// That it is occupied: 2 to 3 bytes a voxel.
+    /// Occupancy only: 2 to 3 bytes a voxel.
     Occupancy,
 }
 
@@ -122,11 +122,11 @@ impl MapperOptions {
             return Err(params.invalid("payload", problem));
         }
         if read.payload == MapPayload::Occupancy && read.when_full != WhenFull::Refuse {
-            let problem = "payload occupancy knows no oldest voxel: needs refuse";
+            let problem = "payload occupancy has no stamps to find the oldest voxel: needs refuse";
             return Err(params.invalid("when_full", problem));
         }
         if read.voxel_limit() == 0 {
-            let problem = "too little for a single voxel; a small map takes 1000000";
+            let problem = "less memory than one voxel needs; a small map needs 1000000";
             return Err(params.invalid("max_map_bytes", problem));
         }
         Ok(read)
@@ -137,21 +137,21 @@ impl MapperOptions {
         Ok(params.bool("keep_labels", false)?.then_some(options))
     }
 
-    /// Orientation of the lattice in the map that the parameters ask for, whichever lattice it is.
+    /// Orientation of the lattice given by the parameters.
     pub fn orientation_from(params: &Params) -> Result<Orientation, ParamError> {
         let name = params.string("lattice_orientation", "paper")?;
         name.parse()
             .map_err(|e| params.invalid("lattice_orientation", format!("{e}")))
     }
 
-    /// Gate for the stamps of clouds, where voxels grow old by them.
+    /// Stamp check of clouds, if voxels expire.
     pub(super) fn stamp_gate(&self) -> Option<StampGate> {
         let age_ns = self.forget_after_ns;
         let step_ns = (age_ns / 2).max(SECOND_NS);
         (age_ns > 0).then(|| StampGate::new(step_ns, step_ns, AGREEING_CLOUDS))
     }
 
-    /// Columns of a voxel of centroids.
+    /// Payload columns of centroid voxels.
     pub(super) fn payload(&self) -> Payload {
         Payload {
             stamps: self.forget_after_ns > 0,
@@ -159,7 +159,7 @@ impl MapperOptions {
         }
     }
 
-    /// Most voxels that both limits allow.
+    /// Voxel limit that satisfies both limits.
     pub(super) fn voxel_limit(&self) -> usize {
         match self.max_map_bytes {
             0 => self.max_voxels,
@@ -171,7 +171,7 @@ impl MapperOptions {
     }
 }
 
-/// Volume of a cell, which either of two parameters gives.
+/// Cell volume, given by one of two parameters.
 fn cell_volume_m3(params: &Params) -> Result<f64, ParamError> {
     let volume_m3 = params.f64("cell_volume_m3", 0.125)?;
     let size_m = params.f64("cell_size_m", 0.0)?;
@@ -188,8 +188,8 @@ fn cell_volume_m3(params: &Params) -> Result<f64, ParamError> {
     Err(params.invalid("cell_size_m", problem))
 }
 
-/// Volume of a cube by its edge, m^3, to fifteen digits: that of 0.05 m is 0.000125, as one would type it, so that
-/// cells by size and by volume are the same to the bit.
+/// Volume of a cube by its edge, m^3, rounded to fifteen digits: 0.05 m gives 0.000125, so that
+/// cells by size and by volume are equal to the bit.
 pub fn cube_m3(edge_m: f64) -> f64 {
     let cube = edge_m * edge_m * edge_m;
     format!("{cube:.14e}").parse().unwrap_or(cube)
@@ -197,7 +197,7 @@ pub fn cube_m3(edge_m: f64) -> f64 {
 
 fn forget_after_ns(params: &Params) -> Result<i64, ParamError> {
     let seconds = params.f64("forget_after_s", 0.0)?;
-    // A century; and less than a nanosecond is not an age.
+    // At most a century; less than a millisecond is not a useful age.
     if seconds == 0.0 || (1e-3..=3e9).contains(&seconds) {
         return Ok((seconds * 1e9) as i64);
     }

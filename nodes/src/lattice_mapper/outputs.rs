@@ -7,7 +7,7 @@ use lattice_runtime::{Node, Publisher};
 
 use crate::start::NodeError;
 
-/// The further topics that the node speaks on.
+/// Publishers of further topics.
 pub(super) struct Outputs {
     pub centers: Publisher<PointCloud2>,
     pub free: Option<Publisher<LatticeMap>>,

@@ -1,4 +1,4 @@
-//! All parameters of the mapper.
+//! Parameters of the mapper.
 
 use std::time::Duration;
 
@@ -12,46 +12,46 @@ use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
     "lattice" fixed(MAP): "cubic, bcc, fcc, mcc, hex or hexopt.";
-    "lattice_orientation" fixed(MAP): "How its cells lie: paper (axes as Ryde & Bruenig print them), ground (flattest), or a crystal direction that points up, as 110-up.";
-    "cell_volume_m3" fixed(MAP): "Volume of one cell: 0.125 is as much as a cube of 0.5 m.";
-    "cell_size_m" fixed(MAP): "Edge of the cube with the volume of one cell, in place of cell_volume_m3; 0.0: as cell_volume_m3 says.";
-    "map_frame" fixed(options::FRAME): "Frame that clouds must be in.";
-    "datum_m" fixed(MAP): "Keys are counted from the lattice point next to this place in the map frame. They reach a million cells in every direction. If not set, the place is the origin, or near the first point where that is out of reach, as in UTM.";
+    "lattice_orientation" fixed(MAP): "Orientation of the cells: paper (axes as printed by Ryde & Bruenig), ground (flattest), or a crystal direction that points up, such as 110-up.";
+    "cell_volume_m3" fixed(MAP): "Volume of one cell: 0.125 is that of a cube of 0.5 m.";
+    "cell_size_m" fixed(MAP): "Edge of the cube with the volume of one cell, in place of cell_volume_m3; 0.0: use cell_volume_m3.";
+    "map_frame" fixed(options::FRAME): "Required frame of clouds.";
+    "datum_m" fixed(MAP): "Origin of the voxel keys: the lattice point nearest to this position in the map frame. Keys reach a million cells in every direction. If not set, the origin, or near the first point if that is out of range, as in UTM.";
     "payload" fixed(MAP): "centroid: count and mean of the points of each voxel; occupancy: 2 to 3 bytes a voxel, without count, mean, labels and stamps.";
-    "free_space" fixed(MAP): "off: voxels stay; clear: voxels that rays from the sensor pass through go; evidence: those that are probably free by the hits and misses of all scans. Needs viewpoints of enu_transformer. In quotes: YAML reads a bare off as false.";
-    "rays.sweep_s": "Clouds of this long are one scan; 0: each is one. What any of them hits, the others do not clear. A laser on a turntable needs a turn.";
-    "rays.max_range_m": "Rays are followed to this range; 0: to their ends.";
-    "rays.misses": "Scans that must pass through a voxel, with none between that hits it (clear).";
-    "rays.keep_m": "The last part of each ray, which clears nothing; that or keep_ratio, whichever is longer. Ground at a flat angle needs the size of a cell over the height of the sensor.";
-    "rays.keep_ratio": "The same as a fraction of the ray.";
-    "rays.spare_touching": "Whether voxels that touch a cell which the scan hit are spared (clear).";
-    "rays.max_bytes" fixed(MAP): "Most memory for rays and evidence, bytes.";
+    "free_space" fixed(MAP): "Use of rays from the sensor: off (voxels stay), clear (rays clear voxels), or evidence (voxels that are probably free by the hits and misses of all scans are removed). Needs viewpoints of enu_transformer. In quotes: YAML parses a bare off as false.";
+    "rays.sweep_s": "Duration of the clouds of one scan; 0: each cloud is a scan. Cells hit by any of them are not cleared by the others. A laser on a turntable needs one revolution.";
+    "rays.max_range_m": "Length limit of rays; 0: no limit.";
+    "rays.misses": "Consecutive scans that must miss a voxel before it is cleared (clear).";
+    "rays.keep_m": "Length of the end of each ray that clears nothing; this or keep_ratio, whichever is longer. Ground at a flat angle needs the cell size over the height of the sensor.";
+    "rays.keep_ratio": "Length of that end as a fraction of the ray.";
+    "rays.spare_touching": "Whether voxels that touch a cell hit by the scan are kept (clear).";
+    "rays.max_bytes" fixed(MAP): "Memory limit for rays and evidence, bytes.";
     "evidence.hit": "Probability that a cell is occupied after one hit.";
     "evidence.miss": "Probability that a cell is occupied after one miss.";
-    "evidence.least": "The probability never becomes less than this.";
-    "evidence.most": "The probability never becomes more than this.";
-    "evidence.threshold": "Cells of at least this probability are occupied.";
-    "free_level" fixed(MAP): "Free cells are published as free, 2^free_level as wide as voxels, 1 to 3; 0: not (evidence).";
+    "evidence.least": "Lower bound of the occupancy probability.";
+    "evidence.most": "Upper bound of the occupancy probability.";
+    "evidence.threshold": "Smallest probability of an occupied cell.";
+    "free_level" fixed(MAP): "Level of published free cells: 2^free_level as wide as voxels, 1 to 3; 0: not published (evidence).";
     "max_voxels": "Most voxels.";
-    "max_map_bytes" fixed(MAP): "Most memory for voxels, bytes, at the worst 330 for each; 0: as much as max_voxels takes.";
-    "when_full": "refuse: points in new cells are refused and counted when the map is full; forget_oldest: an eighth of the voxels goes, those that no point has touched for longest.";
-    "forget_after_s": "Voxels go when their last point is older than this by the stamps of the clouds; 0: never, from the start to the end. Costs 16 bytes a voxel, and inserting takes longer. Clouds whose stamps jump by more than half of it, and a second, are refused and counted until five in a row agree on the new time.";
-    "max_cloud_points": "Clouds of more points are refused.";
-    "keep_labels" fixed(MAP): "Whether labels are counted in each voxel: map, map_updates and map_centers then tell the most frequent one. Costs 24 bytes a voxel and 8 for each of its labels, and inserting takes longer.";
-    "chunk_bytes": "Largest message of map and map_updates, bytes. Above 60 kB reliable messages are cut into fragments, whose repair is slow.";
-    "update_period_s": "Time between two messages of map_updates.";
-    "centers_period_s": "Time between two messages of map_centers.";
-    "free_period_s": "Time between two messages of free.";
-    "map_dir" fixed("it names outputs"): "Folder below which ~/save_map and ~/load_map take names of files; by default the one that the node was started in. Only maps are replaced.";
-    "autosave_period_s": "Time between two saves of a map that changes, and at its end; 0: never.";
+    "max_map_bytes" fixed(MAP): "Memory limit for voxels, bytes, at the worst 330 for each; 0: limited by max_voxels only.";
+    "when_full": "Policy for a full map: refuse (points in new cells are rejected and counted) or forget_oldest (an eighth of the voxels is removed, those without points for longest).";
+    "forget_after_s": "Age limit of voxels since their last point, by the stamps of the clouds; 0: none, not settable at run time. Costs 16 bytes a voxel and insertion time. Clouds whose stamps jump by more than half of it, and a second, are rejected and counted until five in a row agree on the new time.";
+    "max_cloud_points": "Limit of points per cloud; larger clouds are rejected.";
+    "keep_labels" fixed(MAP): "Whether labels are counted in each voxel: map, map_updates and map_centers then contain the most frequent one. Costs 24 bytes a voxel, 8 for each of its labels, and insertion time.";
+    "chunk_bytes": "Largest message of map and map_updates, bytes. Above 60 kB reliable messages are fragmented, and repair is slow.";
+    "update_period_s": "Period of map_updates.";
+    "centers_period_s": "Period of map_centers.";
+    "free_period_s": "Period of free.";
+    "map_dir" fixed("it names outputs"): "Folder of the files of ~/save_map and ~/load_map; by default the working directory. Only map files are replaced.";
+    "autosave_period_s": "Period of saves of a changing map, which is also saved at the end; 0: never.";
     "autosave_file" fixed("it names an output"): "File of these saves, below map_dir.";
-    "octomap_services" fixed("services are made with it"): "Whether ~/reset and ~/clear_bbox are as octomap_server has them (std_srvs/Empty, octomap_msgs/BoundingBoxQuery).";
-    "resume" fixed("it is done at the start"): "Whether to go on from that file, if it is there, instead of beginning with an empty map.";
+    "octomap_services" fixed("services are made with it"): "Whether ~/reset and ~/clear_bbox have the types of octomap_server (std_srvs/Empty, octomap_msgs/BoundingBoxQuery).";
+    "resume" fixed("it is done at the start"): "Whether the map is loaded from that file at the start, if it exists, instead of starting empty.";
 };
 
 const MAP: &str = "the map is made with it";
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub mapper: MapperOptions,
     pub limits: ComputeLimits,
@@ -59,7 +59,7 @@ pub(super) struct Settings {
     pub autosave: AutosaveOptions,
     pub update_period: Duration,
     pub centers_period: Duration,
-    /// Zero where there is no free space to publish.
+    /// Zero without free space to publish.
     pub free_period: Duration,
     pub octomap_services: bool,
     pub report_file: String,
@@ -94,20 +94,20 @@ impl Settings {
         })
     }
 
-    /// The same of a node that runs with `old` options.
+    /// Reads the parameters of a node that runs with `old` options.
     pub(super) fn changed(params: &Params, old: &MapperOptions) -> Result<Self, ParamError> {
         let settings = Self::from_params(params)?;
         match settings.mapper.payload().stamps == old.payload().stamps {
             true => Ok(settings),
             false => {
-                let problem = "voxels either have stamps from the start on or never";
+                let problem = "stamps of voxels cannot be switched on or off at run time";
                 Err(params.invalid("forget_after_s", problem))
             }
         }
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

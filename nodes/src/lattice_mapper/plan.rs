@@ -1,4 +1,4 @@
-//! Paths through the map: the compute thread hands over a copy of the cells, a thread searches in it.
+//! Path planning: a thread searches in a copy of the cells made by the compute thread.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -15,13 +15,13 @@ use super::LatticeMapper;
 use super::operations::vector;
 use super::services::{BUSY, spawn};
 
-/// Cells and time after which a search gives up.
+/// Limits of a search: expanded cells and time.
 const MAX_EXPANDED: usize = 300_000;
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Most cells that the ball of a request covers, and that an end may move over.
+/// Limit of cells within the ball of a request, and within the tolerance of an end.
 const MAX_BALL_CELLS: f64 = 8192.0;
 
-/// Searches for paths, one at a time.
+/// Path planner, one search at a time.
 #[derive(Default)]
 pub(super) struct Planner {
     busy: AtomicBool,
@@ -29,23 +29,23 @@ pub(super) struct Planner {
 }
 
 struct Copied {
-    /// Epoch, and number of the update.
+    /// Epoch and update sequence.
     state: (u64, u64),
     cells: Arc<OccupancyList>,
 }
 
 impl Planner {
-    /// False while another search goes on; a search that may begin has to.
+    /// Reserves the planner; false while another search runs. A reserved planner must begin or be freed.
     pub(super) fn take(&self) -> bool {
         !self.busy.swap(true, Ordering::AcqRel)
     }
 
-    /// Allows the next search.
+    /// Releases the planner.
     pub(super) fn free(&self) {
         self.busy.store(false, Ordering::Release);
     }
 
-    /// Searches on a thread; the search ends with the service, which holds the planner.
+    /// Searches on a thread; the search ends with the service, which owns the planner.
     pub(super) fn begin(
         self: Arc<Self>,
         machine: &LatticeMapper,
@@ -66,7 +66,7 @@ impl Planner {
         }
     }
 
-    /// A copy of the cells, made at most once for each update of the map.
+    /// Copy of the cells, made at most once per map update.
     fn cells(&self, machine: &LatticeMapper) -> Arc<OccupancyList> {
         let (state, store) = ((machine.epoch, machine.sequence), machine.cells());
         let mut copy = lock(&self.copy);
@@ -86,7 +86,7 @@ impl Planner {
     }
 }
 
-/// The answer of a service that does not search.
+/// Reply without a search.
 pub(super) fn failed(why: impl ToString) -> PlanPathResponse {
     PlanPathResponse {
         message: why.to_string(),
@@ -94,12 +94,12 @@ pub(super) fn failed(why: impl ToString) -> PlanPathResponse {
     }
 }
 
-/// The answer while another search goes on.
+/// Reply while another search runs.
 pub(super) fn busy() -> PlanPathResponse {
-    failed(format!("another path is searched: {BUSY}"))
+    failed(format!("another search is running: {BUSY}"))
 }
 
-/// Searches a path; gives up once `go_on` says no.
+/// Searches a path; stops once `go_on` returns false.
 fn plan(
     store: &impl VoxelStore,
     request: &PlanPathRequest,
@@ -108,7 +108,7 @@ fn plan(
     match find(store, request, go_on) {
         Ok(path) => PlanPathResponse {
             success: true,
-            message: format!("{:.2} m, {} cells looked at", path.length_m, path.expanded),
+            message: format!("{:.2} m, {} cells expanded", path.length_m, path.expanded),
             length_m: path.length_m,
             path: path.centers_m.iter().map(point).collect(),
         },
@@ -131,7 +131,7 @@ fn find(
             / store.lattice().cell_volume_m3();
         if cells > MAX_BALL_CELLS {
             let problem = format!("{name} of {distance_m} m: a ball of {cells:.0} cells");
-            return Err(format!("{problem}, at most {MAX_BALL_CELLS} are allowed"));
+            return Err(format!("{problem}, more than {MAX_BALL_CELLS}"));
         }
     }
     let query = Query::new(store);
@@ -156,7 +156,7 @@ fn find(
     let path = query.shortest_path_while(&start_m, &goal_m, &options, go_on);
     path.map_err(|error| match error {
         PathError::Limit { expanded } => {
-            format!("no path found among {expanded} cells: the search gave up")
+            format!("no path found after {expanded} cells: the search limit is reached")
         }
         error => error.to_string(),
     })
@@ -262,7 +262,7 @@ mod tests {
             asked <= 7
         });
         assert!(
-            stopped.message.contains("7 cells: the search gave up"),
+            stopped.message.contains("7 cells: the search limit"),
             "{}",
             stopped.message
         );

@@ -1,11 +1,11 @@
-//! Reasons for which clouds are not mapped.
+//! Reasons for rejecting clouds.
 
 use thiserror::Error;
 
-/// Reason for which a cloud was not mapped. The map is as it was before.
+/// Reason for rejecting a cloud. The map is unchanged.
 #[derive(Debug, Error)]
 pub enum CloudRefusal {
-    /// In another frame than the map's.
+    /// Frame other than the map's.
     #[error(
         "cloud in frame '{found}', expected '{expected}': is enu_transformer between the sensor and the mapper?"
     )]
@@ -15,18 +15,18 @@ pub enum CloudRefusal {
         /// The mapper's `map_frame`.
         expected: String,
     },
-    /// The bytes are not what the header says.
+    /// The data do not match the header.
     #[error("malformed cloud: {0}")]
     Malformed(#[from] lattice_core::cloud::CloudError),
-    /// Of another time than the clouds before, by which voxels grow old.
+    /// Stamp of another time, which would make voxels expire.
     #[error(
-        "cloud of {stamp_ns} ns, {:.1} s from the one before: is a clock wrong?",
+        "cloud stamp {stamp_ns} ns is {:.1} s from the previous one: check the clocks",
         *step_ns as f64 * 1e-9
     )]
     Stamp {
         /// As sent.
         stamp_ns: i64,
-        /// From the stamp of the cloud before.
+        /// Difference to the stamp of the previous cloud.
         step_ns: i64,
     },
 }

@@ -1,4 +1,4 @@
-//! Report of a `lattice_mapper` at its end.
+//! Report of a `lattice_mapper`.
 
 use lattice_core::voxels::Distortion;
 use lattice_msgs::cdr;
@@ -6,30 +6,30 @@ use serde::{Deserialize, Serialize};
 
 use super::{LatticeMapper, MapperCounts};
 
-/// The end of a `lattice_mapper`.
+/// Report of a `lattice_mapper`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapperReport {
     /// Name of the lattice.
     pub lattice: String,
     /// Volume of one cell.
     pub cell_volume_m3: f64,
-    /// Everything counted by the state machine.
+    /// Counters of the state machine.
     pub counts: MapperCounts,
-    /// Clouds that found the inbox, or the queue before it, full.
+    /// Clouds rejected by a full inbox or overrun before it.
     pub clouds_inbox_full: u64,
-    /// Clouds that were sent and did not come.
+    /// Clouds lost on the network.
     #[serde(default)]
     pub clouds_lost_on_network: u64,
-    /// Samples that did not decode.
+    /// Undecodable samples.
     pub undecodable: u64,
-    /// Updates that the publisher did not take or could not send; a keyframe followed.
+    /// Updates dropped by the publisher; a keyframe followed.
     pub updates_not_published: u64,
-    /// Chunks of keyframes that it took and could not send.
+    /// Keyframe chunks dropped by the publisher.
     #[serde(default)]
     pub chunks_not_published: u64,
     /// Voxels in the map.
     pub voxels: usize,
-    /// Points that the statistics are of.
+    /// Points in the distortion statistics.
     pub points: u64,
     /// Mean squared error per dimension.
     pub mse_per_dimension_m2: f64,
@@ -46,7 +46,7 @@ pub struct MapperReport {
 }
 
 impl MapperReport {
-    /// Sums up a mapper; makes one keyframe to count its bytes.
+    /// Report of a mapper; creates one keyframe to count its bytes.
     pub fn of(mapper: &mut LatticeMapper) -> Self {
         let Distortion {
             points,

@@ -1,4 +1,4 @@
-//! The services of the node: requests become events, files are read and written on threads of their own.
+//! Services of the node: requests become events; files are read and written on separate threads.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -23,19 +23,19 @@ use lattice_runtime::{Node, Reply, Server};
 
 pub(super) const BUSY: &str = "busy, ask again";
 
-/// A request that the compute thread answers.
+/// Request handled by the compute thread.
 pub(super) enum Call {
     Save(SaveMapRequest, Reply<SaveMapResponse>),
-    /// With the map that was read.
+    /// Load the map that was read.
     Load(Box<MapContents>, Reply<LoadMapResponse>),
     ClearBox(ClearBoxRequest, Reply<ClearBoxResponse>),
     ClearBoundingBox(ClearBoxRequest, Reply<BoundingBoxQueryResponse>),
     Query(QueryMapRequest, Reply<QueryMapResponse>),
-    /// With the planner, which has been taken.
+    /// Plan a path with the reserved planner.
     Plan(PlanPathRequest, Reply<PlanPathResponse>, Arc<Planner>),
 }
 
-/// Serves all calls; `wrap` makes an event of one.
+/// Serves all calls; `wrap` converts one to an event.
 pub(super) fn serve<E: Send + 'static>(
     node: &Node,
     inbox: &Inbox<E>,
@@ -86,7 +86,7 @@ pub(super) fn serve<E: Send + 'static>(
     ])
 }
 
-/// Serves requests that become events; the answer of a full inbox is `failed`.
+/// Serves requests as events; `failed` is the reply if the inbox is full.
 fn ask<S: RosService + 'static, E: Send + 'static>(
     node: &Node,
     name: &str,
@@ -107,13 +107,13 @@ fn ask<S: RosService + 'static, E: Send + 'static>(
 /// Outcome of a call.
 #[derive(Default)]
 pub(super) struct Done {
-    /// A file is being written.
+    /// Thread that writes a file.
     pub(super) writing: Option<JoinHandle<()>>,
-    /// The map has been replaced.
+    /// True if the map was replaced.
     pub(super) replaced: bool,
 }
 
-/// Answers a call on the compute thread.
+/// Executes a call on the compute thread.
 pub(super) fn answer(
     machine: &mut LatticeMapper,
     call: Call,
@@ -146,7 +146,7 @@ pub(super) fn answer(
         Call::ClearBoundingBox(request, reply) => {
             let done = machine.clear_box(&request);
             if !done.success {
-                log::warn!("a box is not cleared: {}", done.message);
+                log::warn!("box not cleared: {}", done.message);
             }
             reply.send(BoundingBoxQueryResponse::default());
         }

@@ -1,4 +1,4 @@
-//! The state of a mapper that has mapped nothing yet.
+//! Status of a mapper with an empty map.
 
 use std::time::Instant;
 
@@ -9,12 +9,12 @@ pub(super) struct Unmapped {
     since: Instant,
     /// Topic of the clouds.
     topic: String,
-    /// Of the last cloud that was refused.
+    /// Reason for the last rejected cloud.
     pub last_refusal: Option<String>,
 }
 
 impl Unmapped {
-    /// From now on.
+    /// Begins now.
     pub fn new(topic: String) -> Self {
         Self {
             since: Instant::now(),
@@ -23,7 +23,7 @@ impl Unmapped {
         }
     }
 
-    /// The state in one line.
+    /// Status in one line.
     pub fn message(&self, counts: &MapperCounts) -> String {
         let seconds = self.since.elapsed().as_secs();
         format!(
@@ -36,10 +36,10 @@ impl Unmapped {
         let (topic, clouds) = (&self.topic, counts.clouds_in);
         match &self.last_refusal {
             _ if clouds == 0 => {
-                format!("none came on {topic}; /diagnostics of enu_transformer has its reason")
+                format!("none received on {topic}; see /diagnostics of enu_transformer")
             }
             Some(refusal) => {
-                format!("{clouds} clouds came on {topic}, the last was refused: {refusal}")
+                format!("{clouds} clouds received on {topic}, the last rejected: {refusal}")
             }
             None => format!(
                 "{clouds} clouds on {topic} have {} points, {} of them not finite, {} out of the range of the \
@@ -64,7 +64,7 @@ mod tests {
             message.strip_prefix(begin).unwrap().to_owned()
         };
         let none = says(&unmapped, &counts);
-        assert!(none.starts_with("none came on /points_enu"), "{none}");
+        assert!(none.starts_with("none received on /points_enu"), "{none}");
         counts.clouds_in = 2;
         counts.points_in = 7;
         counts.points_not_finite = 7;
@@ -73,7 +73,7 @@ mod tests {
         unmapped.last_refusal = Some("cloud in frame 'velodyne'".to_owned());
         let refused = says(&unmapped, &counts);
         assert!(
-            refused.ends_with("refused: cloud in frame 'velodyne'"),
+            refused.ends_with("rejected: cloud in frame 'velodyne'"),
             "{refused}"
         );
     }

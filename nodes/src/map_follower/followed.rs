@@ -1,32 +1,32 @@
-//! Effects and errors of messages of the map.
+//! Outcomes and errors of map messages.
 
 use thiserror::Error;
 
 use crate::convert::map::MapMessageError;
 
-/// Error of a message of the map. The map is as it was before.
+/// Reason for rejecting a map message. The map is unchanged.
 #[derive(Debug, Error)]
 pub enum FollowError {
-    /// Malformed.
+    /// Malformed message.
     #[error(transparent)]
     Message(#[from] MapMessageError),
-    /// More voxels than allowed.
-    #[error("the map has {found} voxels, at most {limit} are kept (`max_voxels`)")]
+    /// Voxel count above the limit.
+    #[error("the map has {found} voxels, more than {limit} (`max_voxels`)")]
     TooLarge {
-        /// Voxels that there would be.
+        /// Number of voxels including the message.
         found: u64,
         /// The limit.
         limit: usize,
     },
 }
 
-/// Effect of a message.
+/// Outcome of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Followed {
-    /// Applied, or kept until the rest of its keyframe has come.
+    /// Applied, or stored until its keyframe is complete.
     Applied,
-    /// Of the state at hand or an older one, or of a map that is too large; ignored.
+    /// Ignored: not newer than the current state, or of a map that is too large.
     Old,
-    /// Something before it was lost or never received: ask for a keyframe.
+    /// An earlier message is missing: request a keyframe.
     NeedKeyframe,
 }

@@ -1,4 +1,4 @@
-//! Lattice and voxels of a map that is being followed.
+//! Lattice and voxels of a followed map.
 
 use std::collections::HashMap;
 
@@ -11,11 +11,11 @@ use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use super::FollowError;
 use crate::convert::map::{self, MapMessageError, VoxelState};
 
-/// The lattice and voxels of a map that is being followed.
+/// Lattice and voxels of a followed map.
 pub struct FollowedMap {
-    /// Description as received.
+    /// Lattice info as received.
     pub info: LatticeInfo,
-    /// The lattice it names.
+    /// Lattice of the info.
     pub lattice: Lattice,
     /// Its datum in the map frame, in metres.
     pub datum_m: Vector3<f64>,
@@ -28,13 +28,13 @@ pub struct FollowedMap {
     voxels: FxHashMap<MortonKey, VoxelState>,
 }
 
-/// The content of one update chunk, decoded.
+/// Decoded content of one update chunk.
 pub(super) struct Changes {
     pub sequence: u64,
     stamp_ns: i64,
     voxels: Vec<(MortonKey, VoxelState)>,
     removed: Vec<MortonKey>,
-    /// For the checksum.
+    /// Sum for the checksum.
     pub sum: u64,
 }
 
@@ -51,14 +51,14 @@ impl Changes {
         })
     }
 
-    /// Voxels that it changes or removes.
+    /// Number of changed and removed voxels.
     pub fn len(&self) -> usize {
         self.voxels.len() + self.removed.len()
     }
 }
 
 impl FollowedMap {
-    /// A map without voxels.
+    /// Creates an empty map.
     pub(super) fn empty(info: &LatticeInfo, offset_unit_m: f64) -> Result<Self, MapMessageError> {
         let (lattice, datum_m) = map::lattice_from(info)?;
         Ok(Self {
@@ -72,7 +72,7 @@ impl FollowedMap {
         })
     }
 
-    /// Voxels in no order.
+    /// Voxels in arbitrary order.
     pub fn voxels(&self) -> &HashMap<MortonKey, VoxelState, FxBuildHasher> {
         &self.voxels
     }
@@ -82,8 +82,8 @@ impl FollowedMap {
         self.datum_m + self.lattice.center(key.unpack())
     }
 
-    /// The mean point of each voxel with the share of its most frequent label, in the map frame and
-    /// in the order of the keys; without labels if the map has none.
+    /// Mean point of each voxel with the fraction of its most frequent label, in the map frame and
+    /// in key order; unlabelled if the map has no labels.
     pub fn semantic_cloud(&self) -> SemanticCloud {
         let mut voxels: Vec<(&MortonKey, &VoxelState)> = self.voxels.iter().collect();
         voxels.sort_unstable_by_key(|(key, _)| **key);
@@ -102,7 +102,7 @@ impl FollowedMap {
         cloud
     }
 
-    /// True if messages of `info` are about this map, and not about a new one.
+    /// True if messages with `info` belong to this map.
     pub(super) fn is_of(&self, info: &LatticeInfo) -> bool {
         self.info.epoch == info.epoch
             && self.info.lattice == info.lattice
@@ -111,7 +111,7 @@ impl FollowedMap {
             && self.info.map_from_lattice == info.map_from_lattice
     }
 
-    /// Replaces all voxels; keys that came, changed or went are added to `touched`.
+    /// Replaces all voxels; added, changed and removed keys are inserted into `touched`.
     pub(super) fn replace(
         &mut self,
         voxels: FxHashMap<MortonKey, VoxelState>,
@@ -126,7 +126,7 @@ impl FollowedMap {
         touched.extend(changed.map(|(key, _)| *key));
     }
 
-    /// Puts the states of an update chunk into the map; doing it twice changes nothing.
+    /// Applies an update chunk; repetition has no effect.
     pub(super) fn apply(
         &mut self,
         changes: &Changes,

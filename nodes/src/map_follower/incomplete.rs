@@ -1,4 +1,4 @@
-//! Keyframes and updates of which chunks are still to come.
+//! Incomplete keyframes and updates.
 
 use std::collections::BTreeSet;
 
@@ -8,10 +8,10 @@ use rustc_hash::FxHashMap;
 use super::followed_map::Changes;
 use crate::convert::map::{History, VoxelState};
 
-/// Most updates remembered while a keyframe comes in.
+/// Limit of updates stored while a keyframe is received.
 pub(super) const MAX_WAITING_UPDATES: usize = 4096;
 
-/// Chunks of one message that have come. Memory grows with what came, not with what was promised.
+/// Received chunks of one message. Memory grows with received chunks, not with the stated number.
 pub(super) struct Chunks {
     pub expected: u32,
     received: BTreeSet<u32>,
@@ -25,7 +25,7 @@ impl Chunks {
         }
     }
 
-    /// Notes a chunk; false if it had come before.
+    /// Records a chunk; false if it is a duplicate.
     pub fn insert(&mut self, chunk: u32) -> bool {
         self.received.insert(chunk)
     }
@@ -35,24 +35,24 @@ impl Chunks {
     }
 }
 
-/// An update of which not all chunks have come, or that waits for the one before it.
+/// An incomplete update, or one that waits for its predecessor.
 pub(super) struct OpenUpdate {
     pub previous: u64,
     pub chunks: Chunks,
-    /// Over the chunks that have come.
+    /// Sum over the received chunks.
     pub sum: u64,
-    /// State of the map after it.
+    /// Checksum of the map after it.
     pub history: History,
     pub voxels_total: u64,
 }
 
-/// A keyframe of which not all chunks have come, with the updates that came meanwhile.
+/// An incomplete keyframe, with the updates received meanwhile.
 pub(super) struct Staging {
     pub sequence: u64,
     pub history: History,
     pub chunks: Chunks,
     pub voxels: FxHashMap<MortonKey, VoxelState>,
-    /// Newest sequence of the map when the last chunk came.
+    /// Newest sequence of the map at the last received chunk.
     pub heard_at: u64,
     pub later: Vec<Changes>,
     later_voxels: usize,
@@ -71,7 +71,7 @@ impl Staging {
         }
     }
 
-    /// Begins a further keyframe, which the updates at hand are also for.
+    /// Starts another keyframe and keeps the stored updates.
     pub fn restart(self, sequence: u64, history: History, chunks: u32) -> Self {
         Self {
             later: self.later,
@@ -80,7 +80,7 @@ impl Staging {
         }
     }
 
-    /// Keeps an update for the end of the keyframe; false if that would be too much.
+    /// Stores an update for the end of the keyframe; false above the limit.
     pub fn keep(&mut self, changes: Changes, max_voxels: usize) -> bool {
         self.later_voxels = self.later_voxels.saturating_add(changes.len());
         let fits = self.later_voxels <= max_voxels && self.later.len() < MAX_WAITING_UPDATES;

@@ -1,4 +1,4 @@
-//! The consumer's side of `map` and `map_updates`: keyframes, deltas, gaps and late joining.
+//! Follower of `map` and `map_updates`: keyframes, deltas, gaps and late joining.
 
 mod followed;
 mod followed_map;
@@ -17,37 +17,37 @@ use self::followed_map::Changes;
 use self::incomplete::{Chunks, MAX_WAITING_UPDATES, OpenUpdate, Staging};
 use crate::convert::map::{self, History, MapMessageError, VoxelState};
 
-/// Most chunks that one keyframe or update may have.
+/// Limit of chunks per keyframe or update.
 const MAX_CHUNKS: u32 = 1 << 16;
-/// Updates without a chunk after which the rest of a keyframe is taken for lost.
+/// Updates without a chunk after which the rest of a keyframe counts as lost.
 const MAX_STAGING_UPDATES: u64 = 10;
-/// Updates in a row that are older than the map before it is taken for another's: more than wait while a
-/// keyframe is worked on.
+/// Consecutive updates older than the map after which it counts as another mapper's: more than are queued while a
+/// keyframe is processed.
 const MAX_OLD_UPDATES: u32 = 128;
-/// Seconds that an update is on its way at most when a later one or a keyframe has overtaken it.
+/// Longest delay of an update that a later update or keyframe has overtaken, s.
 const MAX_OVERTAKEN_S: u32 = 5;
-/// Quiet seconds after which the rest of a keyframe is taken for lost, at first and at most: a
-/// mapper with a long update period must not be asked again and again.
+/// Seconds without a chunk after which the rest of a keyframe counts as lost, initially and at most: a
+/// mapper with a long update period must not receive repeated requests.
 const PATIENCE_S: [u32; 2] = [2, 64];
 
-/// Follows one map from its two topics.
+/// Follower of one map and its two topics.
 pub struct MapFollower {
     max_voxels: usize,
     map: Option<FollowedMap>,
-    /// The map of the epoch before until the first keyframe of the new one is complete, if it is to be kept.
+    /// Map of the previous epoch until the first keyframe of the new one is complete, if it is kept.
     before: Option<FollowedMap>,
     keeps_before: bool,
-    /// State of the voxels; none until the first keyframe of an epoch is complete.
+    /// Sequence of the voxels; `None` until the first keyframe of an epoch is complete.
     sequence: Option<u64>,
-    /// Checksum of the updates up to there.
+    /// Checksum of the updates up to that sequence.
     history: History,
-    /// Times that the map was found to be another than its mapper's.
+    /// Number of detected differences from the mapper's map.
     differences: u64,
-    /// Old updates in a row.
+    /// Consecutive old updates.
     old_updates: u32,
-    /// Stamp of the keyframe that the map is at, until an update follows it.
+    /// Stamp of the last applied keyframe, until an update follows it.
     keyframe_ns: Option<i64>,
-    /// Seconds since the sequence has changed.
+    /// Seconds since the last change of the sequence.
     still_s: u32,
     /// Newest sequence of any message of the epoch.
     newest: u64,
@@ -55,16 +55,16 @@ pub struct MapFollower {
     open_updates: BTreeMap<u64, OpenUpdate>,
     touched: FxHashSet<MortonKey>,
     replaced: bool,
-    /// A keyframe is needed, and none has come since.
+    /// A keyframe is needed and has not arrived.
     keyframe_needed: bool,
-    /// Epoch of a map that was refused for its size: to ask for it again is of no use.
+    /// Epoch of a map above the size limit: further requests are useless.
     too_large: Option<u64>,
     quiet_s: u32,
     patience_s: u32,
 }
 
 impl MapFollower {
-    /// Follows nothing yet; keeps at most `max_voxels`.
+    /// An empty follower that keeps at most `max_voxels`.
     pub fn new(max_voxels: usize) -> Self {
         Self {
             max_voxels,
@@ -95,12 +95,12 @@ impl MapFollower {
         self
     }
 
-    /// The map of the epoch before, if it is kept and the first keyframe of the new one is not complete.
+    /// Map of the previous epoch, if it is kept and the first keyframe of the new one is incomplete.
     pub fn before(&self) -> Option<&FollowedMap> {
         self.before.as_ref()
     }
 
-    /// Keeps at most so many from now on; a map that is larger stays until a message of it comes.
+    /// Changes the voxel limit; a larger map stays until its next message.
     pub fn set_max_voxels(&mut self, max_voxels: usize) {
         if max_voxels > self.max_voxels {
             self.too_large = None;
@@ -108,23 +108,23 @@ impl MapFollower {
         self.max_voxels = max_voxels;
     }
 
-    /// The map as far as it is complete.
+    /// The current map.
     pub fn map(&self) -> Option<&FollowedMap> {
         self.map.as_ref()
     }
 
-    /// Sequence that the map is at; none before the first keyframe of an epoch is complete.
+    /// Sequence of the map; `None` before the first keyframe of an epoch is complete.
     pub fn sequence(&self) -> Option<u64> {
         self.sequence
     }
 
-    /// Times that the map was found to be another than its mapper's, and a keyframe was asked for.
+    /// Number of detected differences from the mapper's map, each with a keyframe request.
     pub fn differences(&self) -> u64 {
         self.differences
     }
 
-    /// Keys whose voxels came, changed or went since the call before, and whether the lattice,
-    /// epoch or datum is a new one (then nothing of the old map holds).
+    /// Keys of voxels added, changed or removed since the last call, and true if lattice,
+    /// epoch or datum are new (then all of the old map is obsolete).
     pub fn take_touched(&mut self) -> (FxHashSet<MortonKey>, bool) {
         (
             std::mem::take(&mut self.touched),
@@ -132,7 +132,7 @@ impl MapFollower {
         )
     }
 
-    /// Takes one chunk of a keyframe.
+    /// Handles one chunk of a keyframe.
     pub fn on_map(&mut self, message: &LatticeMap) -> Result<Followed, FollowError> {
         check_chunk(message.chunk, message.chunks)?;
         if message.voxels_total > self.max_voxels as u64 {
@@ -150,7 +150,7 @@ impl MapFollower {
             .as_ref()
             .is_some_and(|map| map.is_of(&message.info))
         {
-            // Also the rest of one that a repeated chunk has completed: it would never be whole.
+            // Includes the rest of a keyframe whose chunks were repeated: it cannot become complete.
             if self.sequence.is_some_and(|at| message.sequence <= at) {
                 return Ok(Followed::Old);
             }
@@ -164,7 +164,7 @@ impl MapFollower {
         let history = History(message.history_checksum);
         let staging = match self.staging.take() {
             None => {
-                // Updates that wait for a lost one were not kept for it: they must come again.
+                // Updates that wait for a lost one are dropped: the keyframe makes them obsolete.
                 self.open_updates.clear();
                 Staging::new(message.sequence, history, message.chunks)
             }
@@ -179,7 +179,7 @@ impl MapFollower {
         self.stage(staging, message.chunk, voxels)
     }
 
-    /// Takes one chunk of an update.
+    /// Handles one chunk of an update.
     pub fn on_update(&mut self, message: &LatticeMapUpdate) -> Result<Followed, FollowError> {
         check_chunk(message.chunk, message.chunks)?;
         let info = &message.info;
@@ -192,15 +192,15 @@ impl MapFollower {
                 false => self.need_keyframe(),
             });
         };
-        // The origin on earth may become known after the map has begun.
+        // The geodetic origin may become known after the map has begun.
         map.info.origin = info.origin;
         map.info.has_origin = info.has_origin;
         let history = History(message.history_checksum);
         if let Some(at) = self.sequence.filter(|at| message.sequence <= *at) {
-            // One of the same number and other content, or many in a row, of which none can be new:
-            // somebody else has taken the map to where it is.
+            // The same sequence with other content, or many old updates in a row:
+            // the current map is of another mapper.
             self.old_updates += 1;
-            // So is a later one than the keyframe that it is said to precede.
+            // A newer stamp than that of the keyframe it should precede means the same.
             let stamp_ns = message.header.stamp.to_ns();
             let is_other = message.sequence == at && history != self.history
                 || self.still_s > MAX_OVERTAKEN_S
@@ -218,7 +218,7 @@ impl MapFollower {
             && self.staging.is_none();
         let changes = Changes::of(message, self.max_voxels)?;
         let sum = changes.sum;
-        // Half a map is none: before its first keyframe is complete, nothing is put into it.
+        // Updates are applied only after the first keyframe is complete.
         if self.sequence.is_some() {
             map.apply(&changes, self.max_voxels, &mut self.touched)?;
         }
@@ -247,7 +247,7 @@ impl MapFollower {
             return Ok(self.differ(why));
         }
         if let Some(staging) = &self.staging {
-            // A keyframe that the updates have overtaken is of no more use.
+            // A keyframe older than the updated map is obsolete.
             if self.sequence.is_some_and(|at| staging.sequence <= at) {
                 self.staging = None;
             } else if self.newest.saturating_sub(staging.heard_at) > MAX_STAGING_UPDATES {
@@ -265,9 +265,9 @@ impl MapFollower {
         })
     }
 
-    /// Waits one second more for what is incomplete; true if a keyframe is to be asked for, since
-    /// nothing more has come of it. To be called once a second.
-    pub fn wait_a_second(&mut self) -> bool {
+    /// Advances the timeout of incomplete messages; true if a keyframe is to be requested because
+    /// no chunk has arrived. To be called once a second.
+    pub fn check_keyframe_timeout(&mut self) -> bool {
         self.still_s = self.still_s.saturating_add(1);
         let incomplete = self.staging.is_some() || !self.open_updates.is_empty();
         if !incomplete && !self.keyframe_needed {
@@ -287,10 +287,10 @@ impl MapFollower {
         Followed::NeedKeyframe
     }
 
-    /// Begins anew, since the map is not its mapper's; it is shown until a keyframe has come.
+    /// Restarts after a difference from the mapper's map; the map stays visible until the next keyframe.
     fn differ(&mut self, why: &str) -> Followed {
         self.differences += 1;
-        log::warn!("the map differs from its mapper's ({why}): it is asked for again");
+        log::warn!("the map differs from its mapper's ({why}): requesting a keyframe");
         (self.sequence, self.keyframe_ns) = (None, None);
         (self.newest, self.old_updates) = (0, 0);
         self.staging = None;
@@ -298,8 +298,8 @@ impl MapFollower {
         self.need_keyframe()
     }
 
-    /// Moves the sequence over every update whose chunks are all here and follow on; an error where
-    /// the map is not what the update says.
+    /// Advances the sequence over all complete consecutive updates; an error if
+    /// a checksum does not match.
     fn advance(&mut self) -> Result<(), &'static str> {
         let Some(at) = &mut self.sequence else {
             return Ok(());
@@ -322,7 +322,7 @@ impl MapFollower {
             if self.history != open.history {
                 return Err("other updates");
             }
-            // Those behind it have been applied already.
+            // Later updates have been applied already.
             let voxels = self.map.as_ref().map_or(0, |map| map.voxels().len()) as u64;
             if self.open_updates.is_empty() && voxels != open.voxels_total {
                 return Err("other voxels");
@@ -333,7 +333,7 @@ impl MapFollower {
 
     fn begin_epoch(&mut self, map: FollowedMap) {
         let old = self.map.replace(map);
-        // Of a new map that was never complete nothing is kept.
+        // An incomplete new map is not kept.
         if self.keeps_before && self.before.is_none() {
             self.before = old;
         }
@@ -372,7 +372,7 @@ impl MapFollower {
         Ok(Followed::Applied)
     }
 
-    /// Puts a complete keyframe in place of the voxels, then what came after it.
+    /// Replaces the voxels by a complete keyframe, then applies the later updates.
     fn adopt(&mut self, done: Staging) -> Result<Result<(), &'static str>, FollowError> {
         let Some(map) = &mut self.map else {
             return Ok(Ok(()));

@@ -1,12 +1,12 @@
-//! Maps of several robots as one.
+//! Merging of maps of several robots.
 //!
-//! Each voxel is the sum of what the robots' maps say of its cell, in integers, so that the order in which
-//! their messages come does not matter. Of each robot the merger knows what `map` tells: counts, mean offsets
+//! Each voxel is the integer sum over the robots' maps, so the order of
+//! messages does not matter. The input of each robot is its `map`: counts, mean offsets
 //! in the unit of the message, and the most frequent label.
 
 pub mod node;
 mod parameters;
-mod share;
+mod robot_map;
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 pub use parameters::declare;
-pub use share::{Refusal, Share};
+pub use robot_map::{Refusal, RobotMap};
 
 use crate::convert::{geometry, map};
 use crate::map_follower::{FollowError, Followed, MapFollower};
@@ -30,51 +30,51 @@ pub struct MergerOptions {
     pub robots: Vec<String>,
     /// Frame that all maps must be in.
     pub map_frame: String,
-    /// Keys are counted from the lattice point next to this place, map frame; metres.
+    /// Origin of the keys: the lattice point nearest to this position, map frame; metres.
     pub datum_m: Vector3<f64>,
-    /// Most voxels of the merged map, and of each robot's.
+    /// Voxel limit of the merged map, and of each robot's.
     pub max_voxels: usize,
     /// Labels of the merged map.
     pub labels: MergedLabels,
-    /// Largest message.
+    /// Largest message, bytes.
     pub chunk_bytes: usize,
 }
 
 /// Labels of a merged map.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum MergedLabels {
-    /// None.
+    /// No labels.
     None,
-    /// Those of the robots' maps.
+    /// Labels of the robots' maps.
     Own,
-    /// The robots: label 0 is the first one, with as many points as it has in the voxel.
+    /// One label per robot: 0 is the first, weighted by its points in the voxel.
     Robots,
 }
 
 /// Counters of a merger.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize)]
 pub struct MergerCounts {
-    /// Messages of maps.
+    /// Received map messages.
     pub messages_in: u64,
     /// Messages that were malformed, or of a map that is too large.
     pub messages_refused: u64,
-    /// Times that a robot's map began anew.
+    /// Restarts of a robot's map.
     pub shares_replaced: u64,
-    /// Voxels that found the list full.
+    /// Voxels rejected by a full list.
     pub voxels_list_full: u64,
     /// Voxels more than 2^20 cells from the datum.
     pub voxels_out_of_range: u64,
-    /// Updates that were made.
+    /// Updates created.
     pub updates: u64,
-    /// Keyframes that were made.
+    /// Keyframes created.
     pub keyframes: u64,
 }
 
-/// Follows the maps of several robots and keeps their sum.
+/// Follows the maps of several robots and sums them.
 pub struct MapMerger {
     options: MergerOptions,
-    shares: Vec<Share>,
-    /// None before the first robot's map is known.
+    robot_maps: Vec<RobotMap>,
+    /// `None` before the first robot's map.
     union: Option<VoxelList>,
     origin: Option<GeoPoint>,
     epoch: u64,
@@ -84,11 +84,11 @@ pub struct MapMerger {
 }
 
 impl MapMerger {
-    /// Has heard of no robot yet; `epoch` tells this map from earlier ones on the same topic.
+    /// Merger without maps; `epoch` distinguishes its map from earlier ones on the topic.
     pub fn new(options: MergerOptions, epoch: u64) -> Self {
-        let share = |_| Share::new(MapFollower::new(options.max_voxels));
+        let robot_map = |_| RobotMap::new(MapFollower::new(options.max_voxels));
         Self {
-            shares: (0..options.robots.len()).map(share).collect(),
+            robot_maps: (0..options.robots.len()).map(robot_map).collect(),
             options,
             union: None,
             origin: None,
@@ -99,22 +99,22 @@ impl MapMerger {
         }
     }
 
-    /// Goes on with other options; robots, frame, datum and labels stay as they are.
+    /// Changes the options, except robots, frame, datum and labels.
     pub fn set_options(&mut self, options: MergerOptions) {
         let (max_voxels, chunk_bytes) = (options.max_voxels, options.chunk_bytes);
-        for share in &mut self.shares {
-            share.follower.set_max_voxels(max_voxels);
+        for robot_map in &mut self.robot_maps {
+            robot_map.follower.set_max_voxels(max_voxels);
         }
         self.options.max_voxels = max_voxels;
         self.options.chunk_bytes = chunk_bytes;
     }
 
-    /// Takes a chunk of the keyframe of a robot.
+    /// Handles a keyframe chunk of a robot.
     pub fn on_map(&mut self, robot: usize, chunk: &LatticeMap) -> Result<Followed, FollowError> {
         self.follow(robot, |follower| follower.on_map(chunk))
     }
 
-    /// Takes a chunk of an update of a robot.
+    /// Handles an update chunk of a robot.
     pub fn on_update(
         &mut self,
         robot: usize,
@@ -129,24 +129,25 @@ impl MapMerger {
         message: impl FnOnce(&mut MapFollower) -> Result<Followed, FollowError>,
     ) -> Result<Followed, FollowError> {
         self.counts.messages_in += 1;
-        let Some(share) = self.shares.get_mut(robot) else {
+        let Some(robot_map) = self.robot_maps.get_mut(robot) else {
             return Ok(Followed::Old);
         };
-        let followed = message(&mut share.follower);
+        let followed = message(&mut robot_map.follower);
         self.counts.messages_refused += u64::from(followed.is_err());
         followed
     }
 
-    /// Waits a second more for what is incomplete; gives the robots whose keyframe is to be asked for.
-    pub fn wait_a_second(&mut self) -> Vec<usize> {
-        let waiting = self.shares.iter_mut().enumerate();
-        let waiting = waiting.filter_map(|(i, share)| share.follower.wait_a_second().then_some(i));
+    /// Advances the timeout of incomplete messages; returns the robots whose keyframe is to be requested.
+    pub fn check_keyframe_timeout(&mut self) -> Vec<usize> {
+        let waiting = self.robot_maps.iter_mut().enumerate();
+        let waiting = waiting
+            .filter_map(|(i, robot_map)| robot_map.follower.check_keyframe_timeout().then_some(i));
         waiting.collect()
     }
 
-    /// The changes of all robots since the call before, as one step of the sequence.
+    /// Changes of all robots since the last call, as one update.
     pub fn take_update(&mut self) -> Vec<LatticeMapUpdate> {
-        for robot in 0..self.shares.len() {
+        for robot in 0..self.robot_maps.len() {
             self.admit(robot);
         }
         self.sum_up();
@@ -168,7 +169,7 @@ impl MapMerger {
         messages
     }
 
-    /// The whole map in self-contained chunks; none before a robot's map is known.
+    /// The whole map in self-contained chunks; empty before the first robot's map.
     pub fn keyframe(&mut self) -> Vec<LatticeMap> {
         self.counts.keyframes += 1;
         match &self.union {
@@ -177,13 +178,13 @@ impl MapMerger {
         }
     }
 
-    /// Takes the lattice of a robot's map if it is the first, else holds it against the merged one.
+    /// Adopts the lattice of the first robot's map, else checks compatibility with the merged one.
     fn admit(&mut self, robot: usize) {
         let options = &self.options;
-        let Some(share) = self.shares.get_mut(robot) else {
+        let Some(robot_map) = self.robot_maps.get_mut(robot) else {
             return;
         };
-        let Some(followed) = share.begun() else {
+        let Some(followed) = robot_map.begun() else {
             return;
         };
         self.counts.shares_replaced += 1;
@@ -199,24 +200,24 @@ impl MapMerger {
         let Some(union) = &self.union else {
             return;
         };
-        let admitted = share.admit(union, &options.map_frame, self.origin.as_ref());
+        let admitted = robot_map.admit(union, &options.map_frame, self.origin.as_ref());
         match admitted {
             Ok(origin) => self.origin = self.origin.or(origin),
             Err(refusal) => {
                 let name = options.robots.get(robot).map_or("", String::as_str);
-                log::warn!("the map of {name} is left out: {refusal}");
+                log::warn!("the map of {name} is not merged: {refusal}");
             }
         }
     }
 
-    /// Sums up the cells that changed in any share.
+    /// Sums the cells that changed in any map.
     fn sum_up(&mut self) {
         let Some(union) = &mut self.union else {
             return;
         };
         let mut cells: Vec<MortonKey> = Vec::new();
-        for share in &mut self.shares {
-            self.counts.voxels_out_of_range += share.take_changed(&mut cells);
+        for robot_map in &mut self.robot_maps {
+            self.counts.voxels_out_of_range += robot_map.take_changed(&mut cells);
         }
         cells.sort_unstable();
         cells.dedup();
@@ -224,9 +225,9 @@ impl MapMerger {
         for cell in cells {
             labels.clear();
             let mut sum = Voxel::default();
-            for (robot, share) in (0..).zip(&self.shares) {
+            for (robot, robot_map) in (0..).zip(&self.robot_maps) {
                 let robot = (self.options.labels == MergedLabels::Robots).then_some(robot);
-                share.add_to(cell, &mut sum, &mut labels, robot);
+                robot_map.add_to(cell, &mut sum, &mut labels, robot);
             }
             let labels = labels.iter().map(|(label, count)| LabelCount {
                 label: *label,
@@ -240,14 +241,14 @@ impl MapMerger {
         }
     }
 
-    /// Voxels of the merged map, none before a robot's map is known.
+    /// Voxels of the merged map, `None` before the first robot's map.
     pub fn list(&self) -> Option<&VoxelList> {
         self.union.as_ref()
     }
 
-    /// Robots whose map is part of the merged one, in the order of the options.
-    pub fn shares(&self) -> &[Share] {
-        &self.shares
+    /// Maps of the robots, in the order of the options.
+    pub fn robot_maps(&self) -> &[RobotMap] {
+        &self.robot_maps
     }
 
     /// Counters.
@@ -256,7 +257,7 @@ impl MapMerger {
     }
 
     fn stamp(&self) -> map::MapStamp<'_> {
-        let stamps = self.shares.iter().filter_map(Share::stamp_ns);
+        let stamps = self.robot_maps.iter().filter_map(RobotMap::stamp_ns);
         let newest_ns = stamps.max().unwrap_or(0);
         map::MapStamp {
             header: geometry::header(&self.options.map_frame, newest_ns),

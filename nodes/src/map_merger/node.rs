@@ -1,4 +1,4 @@
-//! The merger as a ROS node: a thin shell around [`MapMerger`].
+//! ROS node around [`MapMerger`].
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -22,7 +22,7 @@ use crate::start::{Finish, NodeError, handed_over, open_params};
 
 /// Event for the compute thread.
 enum Event {
-    /// Of a robot, by its place among the options.
+    /// Map chunk of a robot, by its index in the options.
     Map(usize, Undecoded<LatticeMap>),
     Update(usize, Undecoded<LatticeMapUpdate>),
     Publish,
@@ -36,7 +36,7 @@ struct MergerReport<'a> {
     counts: &'a MergerCounts,
     voxels: usize,
     robots: Vec<(&'a str, usize)>,
-    /// By robot.
+    /// Lost messages per robot.
     #[serde(flatten)]
     losses: BTreeMap<String, u64>,
     updates_not_published: u64,
@@ -59,7 +59,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         let mapper = format!("/{robot}/{}", settings.mapper);
         MapRequests::new(&node, &mapper, losses)
     };
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         inputs: robots
             .iter()
             .zip(&losses)
@@ -76,7 +76,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         name,
         settings.limits,
         runtime.shutdown_handle(),
-        move |event| shell.on(event),
+        move |event| compute_state.on(event),
     )?;
     let inbox = compute.inbox();
     let mut subscriptions: Vec<[Subscription; 2]> = Vec::new();
@@ -103,7 +103,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// The publisher of the robots' names, which every later subscriber gets.
+/// Latched publisher of the robots' names.
 fn names(node: &Node, options: &MergerOptions) -> Result<Publisher<LabelInfo>, NodeError> {
     let classes = (0..)
         .zip(&options.robots)
@@ -121,7 +121,7 @@ fn names(node: &Node, options: &MergerOptions) -> Result<Publisher<LabelInfo>, N
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     inputs: Vec<MapRequests>,
     machine: MapMerger,
     robots: Vec<String>,
@@ -131,7 +131,7 @@ struct Shell {
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Map(robot, chunk) => {
@@ -159,14 +159,14 @@ impl Shell {
     fn publish(&mut self) {
         self.inputs.iter_mut().for_each(MapRequests::make_good);
         if self.seconds.check().is_some() {
-            for robot in self.machine.wait_a_second() {
+            for robot in self.machine.check_keyframe_timeout() {
                 if let Some(input) = self.inputs.get(robot) {
                     input.ask_for_keyframe();
                 }
             }
         }
         let update = self.machine.take_update();
-        // Before the first robot there is no map that could be shown.
+        // Before the first robot there is no map to publish.
         if self.machine.list().is_some() {
             self.output.publish(update, || self.machine.keyframe());
         }
@@ -174,17 +174,18 @@ impl Shell {
     }
 
     fn diagnose(&self) {
-        let shares = || self.robots.iter().zip(self.machine.shares());
-        let refused = shares().find_map(|(robot, share)| Some((robot, share.refusal()?)));
-        let silent: Vec<&str> = shares()
-            .filter(|(_, share)| share.voxels() == 0)
+        let robot_maps = || self.robots.iter().zip(self.machine.robot_maps());
+        let refused =
+            robot_maps().find_map(|(robot, robot_map)| Some((robot, robot_map.refusal()?)));
+        let silent: Vec<&str> = robot_maps()
+            .filter(|(_, robot_map)| robot_map.voxels() == 0)
             .map(|(robot, _)| robot.as_str())
             .collect();
         let counts = self.machine.counts();
         let (level, message) = if let Some((robot, refusal)) = refused {
             (
                 Level::Error,
-                format!("the map of {robot} is left out: {refusal}"),
+                format!("the map of {robot} is not merged: {refusal}"),
             )
         } else if counts.voxels_list_full > 0 {
             (Level::Warn, "the list is full (`max_voxels`)".to_owned())
@@ -194,8 +195,8 @@ impl Shell {
             (Level::Ok, "merging".to_owned())
         };
         let mut values = report::key_values(counts);
-        for (robot, share) in shares() {
-            values.push((format!("{robot}_voxels"), share.voxels().to_string()));
+        for (robot, robot_map) in robot_maps() {
+            values.push((format!("{robot}_voxels"), robot_map.voxels().to_string()));
         }
         let losses = self.losses().into_iter();
         values.extend(losses.map(|(key, count)| (key, count.to_string())));
@@ -203,7 +204,7 @@ impl Shell {
         self.diagnostics.set("merged map", level, message, values);
     }
 
-    /// Messages of each robot that did not come to the machine.
+    /// Lost messages of each robot.
     fn losses(&self) -> BTreeMap<String, u64> {
         let inputs = self.robots.iter().zip(&self.inputs);
         let losses = inputs.flat_map(|(robot, input)| {
@@ -230,12 +231,12 @@ impl Shell {
             self.publish();
         }
         self.output.flush();
-        let shares = self.robots.iter().zip(self.machine.shares());
+        let robot_maps = self.robots.iter().zip(self.machine.robot_maps());
         let report = MergerReport {
             counts: self.machine.counts(),
             voxels: self.voxels(),
-            robots: shares
-                .map(|(robot, share)| (robot.as_str(), share.voxels()))
+            robots: robot_maps
+                .map(|(robot, robot_map)| (robot.as_str(), robot_map.voxels()))
                 .collect(),
             losses: self.losses(),
             updates_not_published: self.output.updates_lost(),

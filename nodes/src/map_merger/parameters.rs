@@ -1,4 +1,4 @@
-//! All parameters of the merger.
+//! Parameters of the merger.
 
 use std::time::Duration;
 
@@ -10,11 +10,11 @@ use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
     "robots" fixed(options::TOPIC): "Names of the robots: their maps are /NAME/map and /NAME/map_updates.";
-    "datum_m" fixed("keys are counted from it"): "Keys of the merged map are counted from the lattice point next to this place in the map frame. They reach a million cells in every direction.";
-    "max_voxels": "Most voxels of the merged map, and of each robot's.";
-    "labels" fixed("the map is made with it"): "Labels of the merged map: own, those of the maps (of each robot the most frequent one of a voxel is known); robots, the robots themselves, with their names on label_info; or none.";
+    "datum_m" fixed("keys are counted from it"): "Origin of the keys of the merged map: the lattice point nearest to this position in the map frame. Keys reach a million cells in every direction.";
+    "max_voxels": "Voxel limit of the merged map, and of each robot's.";
+    "labels" fixed("the map is made with it"): "Labels of the merged map: own (those of the maps; of each robot only the most frequent one of a voxel is known), robots (the robots themselves, with their names on label_info), or none.";
     "chunk_bytes": "Largest message of map and map_updates, bytes.";
-    "update_period_s": "Time between two messages of map_updates.";
+    "update_period_s": "Period of map_updates.";
 };
 
 const MAX_ROBOTS: usize = 1000;
@@ -25,12 +25,12 @@ const LABELS: [(&str, MergedLabels); 3] = [
     ("none", MergedLabels::None),
 ];
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub merger: MergerOptions,
     pub limits: ComputeLimits,
     pub period: Duration,
-    /// Name of the mappers below the robots' namespaces.
+    /// Name of the mappers in the robots' namespaces.
     pub mapper: String,
     pub report_file: String,
 }
@@ -76,7 +76,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

@@ -1,63 +1,61 @@
-//! Errors of meshes.
+//! Reasons for rejecting meshes.
 
 use thiserror::Error;
 
 use crate::files::points::PointFileError;
 
-/// Error of a mesh that cannot be used.
+/// Reason for rejecting a mesh.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum MeshError {
-    /// More of something than is taken.
-    #[error("{found} {what}, but at most {max} are taken")]
+    /// Count above a limit.
+    #[error("{found} {what}, more than {max}")]
     TooMany {
         what: &'static str,
         found: usize,
         max: usize,
     },
-    /// Another number of labels than of triangles.
+    /// Number of labels that does not match the triangles.
     #[error("{found} {what} for {triangles} triangles")]
     Count {
         what: &'static str,
         found: usize,
         triangles: usize,
     },
-    /// A vertex that is not finite, or so far that millimetres are lost.
+    /// Vertex that is not finite, or beyond millimetre precision.
     #[error(
         "vertex {vertex} is at {value} m, not within {max} m; check the unit or move the mesh to its origin"
     )]
     Beyond { vertex: usize, value: f32, max: f32 },
-    /// A triangle of a vertex that is not there.
-    #[error("triangle {triangle} has vertex {vertex}, but there are {vertices}")]
+    /// Vertex index out of range.
+    #[error("triangle {triangle} refers to vertex {vertex}, outside 0..{vertices}")]
     Index {
         triangle: usize,
         vertex: u32,
         vertices: usize,
     },
-    /// A tree of triangles that is too deep.
-    #[error("the triangles are nested {depth} levels deep; cut away what nobody sees")]
+    /// Hierarchy of triangles that is too deep.
+    #[error("the triangles are nested {depth} levels deep; remove hidden triangles")]
     Nested { depth: u32 },
-    /// A file that is not what it should be.
+    /// Malformed file.
     #[error(transparent)]
     File(#[from] PointFileError),
-    /// A line of an OBJ file that cannot be read.
+    /// Invalid line of an OBJ file.
     #[error("OBJ line {line}: {reason}")]
     Obj { line: u64, reason: String },
-    /// A glTF file that cannot be read.
+    /// Invalid glTF file.
     #[error("glTF: {0}")]
     Gltf(String),
-    /// A file with more triangles than are taken.
-    #[error(
-        "the file has {triangles} triangles or more, but at most {max} are allowed: simplify the mesh"
-    )]
+    /// Triangle count of a file above the limit.
+    #[error("the file has {triangles} triangles or more, more than {max}: simplify the mesh")]
     FileTooLarge { triangles: u64, max: usize },
-    /// A file that could be read.
-    #[error("the file was read, but is no mesh: {0}")]
+    /// Valid file without a mesh.
+    #[error("the file contains no mesh: {0}")]
     NoMesh(#[source] Box<MeshError>),
 }
 
 impl MeshError {
-    /// Name under which it is counted.
+    /// Counter name.
     pub fn name(&self) -> &'static str {
         match self {
             Self::TooMany { .. } | Self::FileTooLarge { .. } => "too_large",

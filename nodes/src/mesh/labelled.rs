@@ -1,15 +1,15 @@
-//! A triangle mesh with a class and an instance for each triangle.
+//! Triangle mesh with a class and an instance per triangle.
 
 use super::MeshError;
 
-/// Most triangles, and vertices, of a mesh.
+/// Limit of triangles and of vertices of a mesh.
 pub const MAX_TRIANGLES: usize = 20_000_000;
-/// Coordinates beyond this have no millimetres in f32.
+/// Largest coordinate with millimetre precision in f32.
 pub const MAX_COORDINATE_M: f32 = 1.0e4;
 
-/// Triangles with a class and an instance each, in a frame that the holder names.
+/// Triangles with a class and an instance each, in a frame defined by the owner.
 ///
-/// An instance is one thing: a chair, a shelf, or all walls.
+/// An instance is one object: a chair, a shelf, or all walls.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct LabelledMesh {
     vertices_m: Vec<[f32; 3]>,
@@ -18,7 +18,7 @@ pub struct LabelledMesh {
     instances: Vec<u16>,
 }
 
-/// The parts of a mesh as they are read.
+/// Vertices, triangles, labels and instances while reading.
 #[derive(Default)]
 pub(super) struct Parts {
     pub vertices_m: Vec<[f32; 3]>,
@@ -28,14 +28,14 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// The mesh of them.
+    /// Validated mesh of the parts.
     pub fn mesh(self) -> Result<LabelledMesh, MeshError> {
         LabelledMesh::new(self.vertices_m, self.triangles, self.labels, self.instances)
     }
 }
 
 impl LabelledMesh {
-    /// A mesh of vertices (metres), triangles (three vertices each) and the class and instance of
+    /// Mesh from vertices (metres), triangles (three vertex indices each) and the class and instance of
     /// each triangle.
     pub fn new(
         vertices_m: Vec<[f32; 3]>,
@@ -87,7 +87,7 @@ impl LabelledMesh {
         })
     }
 
-    /// Triangles.
+    /// Number of triangles.
     pub fn len(&self) -> usize {
         self.triangles.len()
     }
@@ -102,7 +102,7 @@ impl LabelledMesh {
         &self.vertices_m
     }
 
-    /// The vertices of each triangle; all of them are there.
+    /// Vertex indices of each triangle, all valid.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
@@ -143,7 +143,7 @@ mod tests {
         let error = mesh(&corners, &[[0, 1, 2], [2, 3, 0]], 2).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "triangle 1 has vertex 3, but there are 3"
+            "triangle 1 refers to vertex 3, outside 0..3"
         );
         for value in [f32::NAN, f32::NEG_INFINITY, 2.0e4] {
             let corners = [[0.0; 3], [0.0, value, 0.0]];

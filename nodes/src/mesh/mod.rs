@@ -1,4 +1,4 @@
-//! Triangle meshes with labels, and what rays hit of them.
+//! Labelled triangle meshes, and ray casting on them.
 
 mod error;
 pub mod gltf;
@@ -16,16 +16,16 @@ use crate::files::points::source::Source;
 use lattice_core::pose::Axes;
 use std::path::Path;
 
-/// Reads a mesh file with a class and an instance for each triangle: OBJ and glTF by their names, else PLY;
-/// also packed with bzip2. An OBJ file has no classes.
+/// Reads a mesh file with a class and an instance per triangle: OBJ and glTF by extension, else PLY;
+/// also compressed with bzip2. OBJ files have no classes.
 ///
-/// PLY and OBJ files are taken as they stand; glTF, in which y is up by definition, is turned to z up.
+/// PLY and OBJ coordinates are unchanged; glTF, with y up by definition, is converted to z up.
 pub fn read_mesh(path: &Path, max_triangles: usize) -> Result<LabelledMesh, MeshError> {
     read_mesh_in(path, Axes::RosFlu, max_triangles)
 }
 
-/// The same for who expects a mesh in these axes: those of glTF become these, as
-/// [`gltf::from_bytes`] says; PLY and OBJ files have them.
+/// Reads a mesh file for a caller with these axes: those of glTF are converted to them, see
+/// [`gltf::from_bytes`]; PLY and OBJ files are assumed to use them.
 pub fn read_mesh_in(
     path: &Path,
     axes: Axes,

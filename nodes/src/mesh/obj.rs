@@ -1,15 +1,15 @@
-//! Meshes from OBJ files: vertices and faces, nothing else.
+//! Meshes from OBJ files: vertices and faces only.
 
 use lattice_core::registration::UNLABELED;
 use std::io::{BufRead, Read};
 
 use super::{LabelledMesh, MeshError};
 
-/// Most bytes of a line.
+/// Longest line, bytes.
 const MAX_LINE: u64 = 1 << 16;
 
-/// Reads `v` (metres) and `f`, whose polygons become fans of triangles without class. Vertices of faces
-/// count from 1, or from the last one backwards if they are negative.
+/// Reads `v` (metres) and `f`; polygons become fans of unlabelled triangles. Vertex indices of faces
+/// count from 1, or backwards from the last one if they are negative.
 pub(super) fn read(mut reader: impl BufRead, max: usize) -> Result<LabelledMesh, MeshError> {
     let (mut vertices_m, mut triangles) = (Vec::new(), Vec::new());
     let mut text = Vec::new();
@@ -41,7 +41,8 @@ pub(super) fn read(mut reader: impl BufRead, max: usize) -> Result<LabelledMesh,
             Some("f") => {
                 let corners = words.map(|word| corner(word, vertices_m.len()));
                 let corners: Option<Vec<u32>> = corners.collect();
-                let corners = corners.ok_or_else(|| fault("a corner is no vertex before it"))?;
+                let corners = corners
+                    .ok_or_else(|| fault("a corner refers to a vertex that is not defined"))?;
                 let Some((&first, others)) = corners.split_first().filter(|(_, o)| o.len() > 1)
                 else {
                     return Err(fault("a face needs three corners"));
@@ -60,7 +61,7 @@ pub(super) fn read(mut reader: impl BufRead, max: usize) -> Result<LabelledMesh,
         .map_err(|error| MeshError::NoMesh(Box::new(error)))
 }
 
-/// Number of the vertex of a corner such as `7`, `7/1/2` or `-1`.
+/// Vertex index of a corner such as `7`, `7/1/2` or `-1`.
 fn corner(word: &str, vertices: usize) -> Option<u32> {
     let number: i64 = word.split('/').next()?.parse().ok()?;
     let from_start = match number {
@@ -97,18 +98,18 @@ mod tests {
             ("v 0 0\n", "line 1: a vertex needs three numbers"),
             ("v 0 0 nil", "line 1: a vertex"),
             ("v 0 0 nan\n", "no mesh: vertex 0"),
-            ("f 1 2\n", "a corner is no vertex before it"),
+            ("f 1 2\n", "a corner refers to a vertex that is not defined"),
             ("f\n", "three corners"),
-            ("f 1 2 3", "a corner is no vertex before it"),
+            ("f 1 2 3", "a corner refers to a vertex that is not defined"),
         ] {
             let error = read_text(text).unwrap_err().to_string();
             assert!(error.contains(problem), "{error}");
         }
         for (faces, problem) in [
-            ("f 1 2 4\n", "line 4: a corner is no vertex"),
-            ("f 1 2 0\n", "line 4: a corner is no vertex"),
-            ("f 1 2 -9223372036854775808\n", "line 4: a corner is no"),
-            (&"f 1 2 3\n".repeat(4), "at most 3 are allowed"),
+            ("f 1 2 4\n", "line 4: a corner refers to a vertex"),
+            ("f 1 2 0\n", "line 4: a corner refers to a vertex"),
+            ("f 1 2 -9223372036854775808\n", "line 4: a corner refers to"),
+            (&"f 1 2 3\n".repeat(4), "more than 3"),
             (&"x".repeat(1 << 16), "line 4: the line is too long"),
         ] {
             let error = read_text(&format!("{corners}{faces}")).unwrap_err();

@@ -8,12 +8,12 @@ use crate::files::points::ply::{axes, number, record};
 use crate::files::points::source::Source;
 use lattice_core::registration::UNLABELED;
 
-/// Most corners of a polygon.
+/// Limit of corners per polygon.
 const MAX_CORNERS: usize = 1024;
-/// Room that is made on the word of a header alone.
+/// Limit of memory reserved from the counts of a header.
 const TRUSTED: u64 = 1 << 16;
 
-/// Columns of the properties of a face.
+/// Property indices of a face.
 struct FaceColumns {
     corners: usize,
     label: Option<usize>,
@@ -24,15 +24,15 @@ struct FaceColumns {
 #[derive(Default)]
 struct Face {
     corners: Vec<f64>,
-    /// Corners of the record, also those beyond [`MAX_CORNERS`].
+    /// Number of corners, including those beyond [`MAX_CORNERS`].
     found: usize,
     label: f64,
     instance: f64,
 }
 
-/// Reads vertices with `x`, `y`, `z` (metres), faces with a list `vertex_indices` or `vertex_index` and numbers
-/// `label` and `instance`. Polygons become fans of triangles. Without labels all are [`UNLABELED`], without
-/// instances each label is one.
+/// Reads vertices with `x`, `y`, `z` (metres), and faces with a list `vertex_indices` or `vertex_index` and optional
+/// `label` and `instance`. Polygons become triangle fans. Without labels all are [`UNLABELED`], without
+/// instances each label is one instance.
 pub(super) fn read(source: &mut Source, max_triangles: usize) -> Result<LabelledMesh, MeshError> {
     let header = Header::read(source)?;
     let mut parts = Parts::default();
@@ -139,12 +139,12 @@ fn read_faces(
     Ok(())
 }
 
-/// A fan of the corners.
+/// Adds the triangle fan of a polygon.
 fn push(face: &Face, parts: &mut Parts) -> Result<(), String> {
     if !(3..=MAX_CORNERS).contains(&face.found) {
         let found = face.found;
         return Err(format!(
-            "a polygon of {found} corners, not 3 to {MAX_CORNERS}"
+            "a polygon of {found} corners is outside 3..={MAX_CORNERS}"
         ));
     }
     let label = whole(face.label, f64::from(u16::MAX), "label")? as u16;
@@ -163,14 +163,12 @@ fn push(face: &Face, parts: &mut Parts) -> Result<(), String> {
     Ok(())
 }
 
-/// A whole number from 0 to `most`.
+/// Checks an integer in 0..=`most`.
 fn whole(value: f64, most: f64, what: &str) -> Result<f64, String> {
     if value.fract() == 0.0 && (0.0..=most).contains(&value) {
         return Ok(value);
     }
-    Err(format!(
-        "{what} {value} is no whole number from 0 to {most}"
-    ))
+    Err(format!("{what} {value} is not an integer in 0..={most}"))
 }
 
 fn face_columns(face: &Element) -> Result<FaceColumns, String> {
@@ -243,13 +241,13 @@ mod tests {
     #[test]
     fn what_is_no_mesh_is_refused_with_the_place() {
         let faults = "\
-            : 3 0 1 4; 3 0 1 2: triangle 0 has vertex 4, but there are 4
-            : 3 0 1 2; 2 0 1: a polygon of 2 corners, not 3 to 1024, in face 2 of 2
-            : 3 0 1 -1; 3 0 1 2: vertex -1 is no whole number
-            : 3 0 1 2; 3 0 1 x: vertex NaN is no whole number
-            property float label: 3 0 1 2 0.5; 3 0 1 2 1: label 0.5 is no whole
-            property int label: 3 0 1 2 65536; 3 0 1 2 1: label 65536 is no whole
-            property int instance: 3 0 1 2 -3; 3 0 1 2 1: instance -3 is no whole";
+            : 3 0 1 4; 3 0 1 2: triangle 0 refers to vertex 4, outside 0..4
+            : 3 0 1 2; 2 0 1: a polygon of 2 corners is outside 3..=1024, in face 2 of 2
+            : 3 0 1 -1; 3 0 1 2: vertex -1 is not an integer
+            : 3 0 1 2; 3 0 1 x: vertex NaN is not an integer
+            property float label: 3 0 1 2 0.5; 3 0 1 2 1: label 0.5 is not an integer
+            property int label: 3 0 1 2 65536; 3 0 1 2 1: label 65536 is not an integer
+            property int instance: 3 0 1 2 -3; 3 0 1 2 1: instance -3 is not an integer";
         for row in faults.lines() {
             let [properties, faces, message] = [0, 1, 2].map(|i| row.split(": ").nth(i).unwrap());
             let properties = format!("{}\n", properties.trim()).trim_start().to_owned();
@@ -270,7 +268,7 @@ mod tests {
             (many + FACES, "99999999999 points or more, but at most 100"),
             (
                 none + &FACES.replace(" 2", " 101"),
-                "101 triangles or more, but at most 100",
+                "101 triangles or more, more than 100",
             ),
         ] {
             let fault = of(elements).unwrap_err();

@@ -1,4 +1,4 @@
-//! Rays against a mesh.
+//! Ray casting on a mesh.
 
 use super::{LabelledMesh, MeshError};
 use nalgebra::{Point3, Vector3};
@@ -11,44 +11,44 @@ use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
 use rustc_hash::FxHashSet;
 
-/// Levels that the traversal has room for.
+/// Depth limit of the traversal stack.
 const MAX_DEPTH: u32 = 31;
 
-/// The first triangle that a ray hits.
+/// First triangle hit by a ray.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct MeshHit {
-    /// From the origin of the ray, m.
+    /// Distance from the ray origin, m.
     pub distance_m: f64,
-    /// Its number in the mesh.
+    /// Index in the mesh.
     pub triangle: usize,
 }
 
-/// A mesh sorted for ray casting: a bounding volume hierarchy eight children wide (Ylitie, Karras &
-/// Laine 2017, by the crate `obvhs`). Both sides of a triangle are seen.
+/// Mesh with a bounding volume hierarchy of eight children per node (Ylitie, Karras &
+/// Laine 2017, by the crate `obvhs`). Both sides of a triangle are hit.
 pub struct MeshScene {
     bvh: CwBvh,
-    /// Triangles in the order of the leaves.
+    /// Triangles in leaf order.
     triangles: Vec<Triangle>,
-    /// Their numbers in the mesh.
+    /// Their indices in the mesh.
     numbers: Vec<u32>,
 }
 
 impl MeshScene {
-    /// Sorts a mesh; 145 000 triangles take some 0.2 s.
+    /// Builds the hierarchy; 145 000 triangles take some 0.2 s.
     ///
-    /// Fails if too many triangles are nested in each other.
+    /// Fails if the hierarchy exceeds the depth limit.
     pub fn new(mesh: &LabelledMesh) -> Result<MeshScene, MeshError> {
         MeshScene::build(mesh, &BvhBuildParams::medium_build())
     }
 
-    /// Sorts a mesh for few rays: sooner done, slower to cast on.
+    /// Builds the hierarchy for few rays: faster to build, slower to cast.
     pub fn new_fast(mesh: &LabelledMesh) -> Result<MeshScene, MeshError> {
         MeshScene::build(mesh, &BvhBuildParams::very_fast_build())
     }
 
     fn build(mesh: &LabelledMesh, params: &BvhBuildParams) -> Result<MeshScene, MeshError> {
         let (mut triangles, mut numbers) = (Vec::new(), Vec::new());
-        // The tree grows as deep as equal triangles are many, and flat ones are never hit.
+        // Equal triangles would make the tree deep, and flat ones are never hit.
         let mut seen = FxHashSet::default();
         for (number, corners) in (0..).zip(mesh.corners_m()) {
             let [v0, v1, v2] = corners.map(Into::into);
@@ -80,9 +80,9 @@ impl MeshScene {
         })
     }
 
-    /// The nearest triangle that a ray hits within `max_m` of its origin, in the frame of the mesh.
+    /// Nearest triangle hit by a ray within `max_m` of its origin, in the frame of the mesh.
     ///
-    /// Computed in f32: right to some 1e-5 m in a house. `None` also for a ray that is not finite or
+    /// Computed in f32, with an error of some 1e-5 m in a house. `None` also for a ray that is not finite or
     /// has no direction.
     pub fn cast(
         &self,
@@ -90,7 +90,7 @@ impl MeshScene {
         direction: &Vector3<f64>,
         max_m: f64,
     ) -> Option<MeshHit> {
-        // The traversal takes a negative zero now for one side and now for the other.
+        // The traversal treats negative zero inconsistently.
         let direction = direction.try_normalize(1e-12)?;
         let direction = direction.map(|c| c as f32 + 0.0);
         let origin = origin_m.coords.cast::<f32>();
@@ -113,7 +113,7 @@ impl MeshScene {
     }
 }
 
-/// Levels of a tree.
+/// Depth of a tree.
 fn depth(bvh: &CwBvh) -> u32 {
     let mut deepest = 0;
     let mut open = vec![(0, 1)];

@@ -1,4 +1,4 @@
-//! Delay with which the poses of a log were recorded out of order.
+//! Delay of poses that were recorded out of order.
 
 use lattice_bag::{BagReader, ReadOptions};
 use lattice_msgs::builtin_interfaces::Time;
@@ -6,14 +6,14 @@ use lattice_msgs::builtin_interfaces::Time;
 use super::topics::TopicError;
 use crate::enu_transformer::StampOrder;
 
-/// Part of the log that is read, from its beginning: poses out of order are so from the start.
+/// Examined part of the log, from its beginning: out of order poses occur from the start.
 const SPAN_NS: i64 = 2_000_000_000;
-/// Most messages that are read.
+/// Limit of examined messages.
 const MAX_MESSAGES: usize = 2000;
-/// Bytes of a message before the end of the stamp of its header.
+/// Bytes of a message up to the end of its header stamp.
 const HEAD_BYTES: usize = 12;
 
-/// Greatest delay, in nanoseconds, with which a message of topics that begin with a header came late in the
+/// Largest delay, in nanoseconds, of an out of order message of topics with headers in the
 /// first part of a log.
 pub(super) fn delay_ns(bag: &BagReader, topics: Vec<String>) -> Result<i64, TopicError> {
     let mut longest_ns = 0;
@@ -37,7 +37,7 @@ pub(super) fn delay_ns(bag: &BagReader, topics: Vec<String>) -> Result<i64, Topi
     Ok(longest_ns)
 }
 
-/// The stamp with which a message begins.
+/// Stamp at the beginning of a message.
 fn stamp(data: &[u8]) -> Option<Time> {
     let head = data.get(..HEAD_BYTES)?;
     lattice_msgs::cdr::from_slice(head).ok()

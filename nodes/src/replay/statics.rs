@@ -1,4 +1,4 @@
-//! Static transforms that a log brings after its first cloud: they hold from its beginning.
+//! Static transforms recorded after the first cloud: they apply from the beginning.
 
 use std::collections::BTreeMap;
 
@@ -13,27 +13,27 @@ use super::survey::{MAX_TF_MESSAGES, bare};
 use super::topics::{Role, TopicError};
 use crate::convert::geometry;
 
-/// Most frames whose static transform is remembered.
+/// Limit of frames with a static transform.
 const MAX_FRAMES: usize = 2000;
-/// Most lines for the user.
+/// Limit of lines for the user.
 const MAX_LINES: usize = 10;
-/// Difference of two values of one transform that is of their printing, m and rad.
+/// Rounding difference of equal transforms, m and rad.
 const SAME: f64 = 1e-6;
 
-/// Static transforms to take before the first message.
+/// Static transforms to apply before the first message.
 #[derive(Debug, Default)]
 pub(super) struct LateStatics {
-    /// The first of each child frame, of those that come after the first cloud.
+    /// First transform of each child frame that is recorded after the first cloud.
     pub message: TFMessage,
-    /// A line for each of them, and for each that changes, for the user.
+    /// A line for each of them, and for each change.
     pub lines: Vec<String>,
     untold: u64,
 }
 
 impl LateStatics {
-    /// Reads the static transforms of a log whose topics have their roles.
+    /// Reads the static transforms of a log with a plan of its topics.
     ///
-    /// A frame that is given two values has the first one up to the second, as in the log itself.
+    /// A frame with two values has the first one until the second, as in the log.
     pub fn read(bag: &BagReader, plan: &TopicPlan) -> Result<Self, TopicError> {
         let mut found = Self::default();
         let messages = |wanted: fn(Role) -> bool| {
@@ -57,7 +57,7 @@ impl LateStatics {
             };
             let after_s = message.log_time_ns.saturating_sub(cloud_ns) as f64 * 1e-9;
             for transform in transforms.transforms {
-                // A transform without meaning is refused when it is replayed.
+                // An invalid transform is rejected during the replay.
                 if let Some(value) = geometry::isometry_from_transform(&transform.transform) {
                     found.take(&mut values, transform, value, after_s);
                 }
@@ -84,7 +84,7 @@ impl LateStatics {
                 let apart = known.inverse() * value;
                 if apart.translation.vector.norm().max(apart.rotation.angle()) > SAME {
                     self.tell(format!(
-                        "static transform {name} changes {after_s:.1} s after the first cloud: the new value holds \
+                        "static transform {name} changes {after_s:.1} s after the first cloud: the new value applies \
                          from there on"
                     ));
                     values.insert(child, value);
@@ -94,7 +94,7 @@ impl LateStatics {
                 values.insert(child, value);
                 if after_s > 0.0 {
                     self.tell(format!(
-                        "static transform {name} comes {after_s:.1} s after the first cloud: it holds from the \
+                        "static transform {name} is recorded {after_s:.1} s after the first cloud: it applies from the \
                          beginning"
                     ));
                     self.message.transforms.push(transform);

@@ -1,4 +1,4 @@
-//! Frames and topics of a log, by its first messages.
+//! Frames and topics of a log, from its first messages.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -15,34 +15,34 @@ use serde::de::DeserializeOwned;
 use super::TopicError;
 use crate::convert::geometry;
 
-/// Part of a log in which frames of `/tf` are looked for, ns.
+/// Part of a log searched for frames of `/tf`, ns.
 const TF_SPAN_NS: i64 = 10_000_000_000;
-/// Most messages of one transform topic that are read.
+/// Limit of messages read per transform topic.
 pub(super) const MAX_TF_MESSAGES: usize = 2000;
-/// Distance from the origin at which coordinates of single precision are a millimetre apart, m.
+/// Distance from the origin at which single precision coordinates have a resolution of a millimetre, m.
 const MAX_DISTANCE_M: f64 = 10_000.0;
-/// Most frames of the tree.
+/// Limit of frames in the tree.
 const MAX_FRAMES: usize = 2000;
 
-/// A cloud topic, by its first message.
+/// A cloud topic, described by its first message.
 pub(super) struct CloudTopic {
     pub topic: usize,
     pub frame: String,
     pub labelled: bool,
 }
 
-/// A topic of poses or of a part of them, by its first message.
+/// A topic of poses or of a part of them, described by its first message.
 pub(super) struct PoseTopic {
     pub topic: usize,
     /// Frame of the header.
     pub frame: String,
     /// `child_frame_id` of odometry; else empty.
     pub child: String,
-    /// Reason for which its first message gives no pose of a map, such as an Imu without orientation.
+    /// Reason why its first message gives no pose in a map, such as an Imu without orientation.
     pub unusable: Option<&'static str>,
 }
 
-/// Parents of frames, whoever published them.
+/// Parents of frames, from all publishers.
 #[derive(Default)]
 pub(super) struct FrameTree {
     parents: BTreeMap<String, BTreeSet<(String, bool)>>,
@@ -92,7 +92,7 @@ impl FrameTree {
         self.frames.contains(frame)
     }
 
-    /// True if transforms connect two frames, or both are one.
+    /// True if transforms connect two frames, or both are equal.
     pub fn connects(&self, a: &str, b: &str) -> bool {
         if a == b {
             return true;
@@ -102,21 +102,21 @@ impl FrameTree {
         of_a.contains(b) || of_b.contains(a) || !of_a.is_disjoint(&of_b)
     }
 
-    /// True if a frame is above another one by at least one moving transform: fixed in the world, as map
-    /// and odom are above the machine.
+    /// True if `frame` is an ancestor of `base` through at least one dynamic transform: fixed in the world, as map
+    /// and odom are.
     pub fn is_world_of(&self, frame: &str, base: &str) -> bool {
         let carried = self.above(base, |is_static| is_static);
         self.above(base, |_| true).contains(frame) && !carried.contains(frame) && frame != base
     }
 
-    /// The uppermost frame above this one.
+    /// Root frame of this one.
     pub fn root(&self, frame: &str) -> String {
         let above = self.above(frame, |_| true);
         let root = above.iter().find(|f| !self.parents.contains_key(*f));
         root.cloned().unwrap_or_else(|| frame.to_owned())
     }
 
-    /// The uppermost frame above this one by static transforms alone.
+    /// Topmost ancestor through static transforms only.
     pub fn static_root(&self, frame: &str) -> String {
         let above = self.above(frame, |is_static| is_static);
         let is_top = |frame: &&String| {
@@ -130,7 +130,7 @@ impl FrameTree {
             .unwrap_or_else(|| frame.to_owned())
     }
 
-    /// Frames above one by transforms of a kind, without itself.
+    /// Ancestors of a frame through transforms of a kind, without itself.
     fn above(&self, frame: &str, kind: impl Fn(bool) -> bool) -> BTreeSet<String> {
         let mut seen = BTreeSet::new();
         let mut open = VecDeque::from([frame.to_owned()]);
@@ -145,7 +145,7 @@ impl FrameTree {
     }
 }
 
-/// The cloud topics with messages.
+/// Cloud topics with messages.
 pub(super) fn clouds(bag: &BagReader) -> Result<Vec<CloudTopic>, TopicError> {
     let mut clouds = Vec::new();
     for topic in topics_of(bag, PointCloud2::TYPE) {
@@ -160,7 +160,7 @@ pub(super) fn clouds(bag: &BagReader) -> Result<Vec<CloudTopic>, TopicError> {
     Ok(clouds)
 }
 
-/// The topics of one type of poses with messages.
+/// Topics of a pose type with messages.
 pub(super) fn poses(bag: &BagReader, type_name: &str) -> Result<Vec<PoseTopic>, TopicError> {
     let mut poses = Vec::new();
     for topic in topics_of(bag, type_name) {
@@ -170,7 +170,7 @@ pub(super) fn poses(bag: &BagReader, type_name: &str) -> Result<Vec<PoseTopic>, 
             child: String::new(),
             unusable: None,
         };
-        // Geodetic poses are in no frame of the log.
+        // Geodetic poses have no frame in the log.
         match type_name {
             Odometry::TYPE => {
                 if let Some(m) = first::<Odometry>(bag, topic)? {
@@ -202,8 +202,8 @@ pub(super) fn poses(bag: &BagReader, type_name: &str) -> Result<Vec<PoseTopic>, 
     Ok(poses)
 }
 
-/// Longest distance between the positions of an odometry and those that transforms give its frames at its stamps, in
-/// the first part of a log, m; 0 where transforms do not give them.
+/// Largest distance between odometry positions and those of its frames by transforms at the same stamps, in
+/// the first part of a log, m; 0 without such transforms.
 pub(super) fn contradiction_m(
     bag: &BagReader,
     odometry: &PoseTopic,
@@ -231,7 +231,7 @@ pub(super) fn contradiction_m(
                 if let Some(pose) = geometry::isometry_from_transform(&transform.transform) {
                     let (parent, child) = (&transform.header.frame_id, &transform.child_frame_id);
                     let stamp_ns = transform.header.stamp.to_ns();
-                    // A transform without meaning is refused when it is replayed.
+                    // An invalid transform is rejected during the replay.
                     let _ = buffer.insert(parent, child, stamp_ns, pose, *is_static);
                 }
             }
@@ -252,7 +252,7 @@ pub(super) fn contradiction_m(
     Ok(longest_m)
 }
 
-/// Places of the topics of a type that have messages.
+/// Indices of the topics of a type with messages.
 pub(super) fn topics_of<'a>(
     bag: &'a BagReader,
     type_name: &'a str,
@@ -263,7 +263,7 @@ pub(super) fn topics_of<'a>(
     of_type.map(|(i, _)| i)
 }
 
-/// The first message of a topic, if it decodes.
+/// First message of a topic, if it decodes.
 fn first<M: DeserializeOwned>(bag: &BagReader, topic: usize) -> Result<Option<M>, TopicError> {
     let name = bag.topics().get(topic).map(|topic| topic.name.clone());
     let options = ReadOptions {

@@ -1,17 +1,17 @@
-//! Checks of a model before anything is made of it.
+//! Checks of a model file before it is loaded.
 
 use tract_onnx::pb::tensor_proto::DataLocation;
 use tract_onnx::pb::{AttributeProto, GraphProto, ModelProto, NodeProto, TensorProto};
 
-/// Most values of a tensor: 1 GiB of floats.
+/// Limit of values per tensor: 1 GiB of floats.
 pub(super) const MAX_TENSOR_VALUES: usize = 1 << 28;
-/// Most operators of a graph, since the time to prepare them grows with the square. Chosen, not measured; what is
-/// slow below it ends by the bound of time.
+/// Limit of operators per graph: preparation time grows with the square. Chosen, not measured;
+/// slow graphs below it end at the load timeout.
 const MAX_OPERATORS: usize = 4000;
-/// Most letters of a file that are shown.
+/// Longest quoted text of a file, characters.
 const SHOWN: usize = 160;
 
-/// A text of a file as it may be shown: not too long, on one line.
+/// Text of a file, shortened to one line for messages.
 pub(super) fn shown(text: &str) -> String {
     let line = text.lines().next().unwrap_or_default();
     line.chars()
@@ -20,12 +20,12 @@ pub(super) fn shown(text: &str) -> String {
         .collect()
 }
 
-/// Checks that operators are known and that tensors have the values that they say.
+/// Checks that all operators are known and that tensors contain their stated values.
 pub(super) fn model(model: &ModelProto, known: impl Fn(&str) -> bool) -> Result<(), String> {
     let graph = model
         .graph
         .as_ref()
-        .ok_or("this is no ONNX file: it has no graph")?;
+        .ok_or("not an ONNX file: the graph is missing")?;
     let mut unknown = Vec::new();
     self::graph(graph, &known, &mut unknown)?;
     unknown.sort();
@@ -33,10 +33,7 @@ pub(super) fn model(model: &ModelProto, known: impl Fn(&str) -> bool) -> Result<
     if unknown.is_empty() {
         return Ok(());
     }
-    Err(format!(
-        "operators that are not known: {}",
-        unknown.join(", ")
-    ))
+    Err(format!("unknown operators: {}", unknown.join(", ")))
 }
 
 fn graph(
@@ -46,9 +43,7 @@ fn graph(
 ) -> Result<(), String> {
     let operators = graph.node.len();
     if operators > MAX_OPERATORS {
-        return Err(format!(
-            "{operators} operators, at most {MAX_OPERATORS} are read"
-        ));
+        return Err(format!("{operators} operators, more than {MAX_OPERATORS}"));
     }
     for given in &graph.initializer {
         tensor(given)?;
@@ -61,12 +56,10 @@ fn graph(
         for attribute in &node.attribute {
             let AttributeProto { t, tensors, .. } = attribute;
             t.iter().chain(tensors).try_for_each(tensor)?;
-            // What is computed inside of them could not be foreseen.
+            // Tensor sizes inside subgraphs could not be bounded.
             if attribute.g.is_some() || !attribute.graphs.is_empty() {
                 let operator = shown(&node.op_type);
-                return Err(format!(
-                    "graphs inside of graphs are not read: operator {operator}"
-                ));
+                return Err(format!("subgraphs are not supported: operator {operator}"));
             }
         }
     }
@@ -81,14 +74,14 @@ fn graph(
         .find(|o| !names.contains(o.name.as_str()));
     match lost {
         Some(output) => Err(format!(
-            "nothing makes its output '{}'",
+            "no operator computes the output '{}'",
             shown(&output.name)
         )),
         None => Ok(()),
     }
 }
 
-/// Values of a shape.
+/// Number of values of a shape.
 fn volume(dims: &[i64]) -> Option<usize> {
     dims.iter().try_fold(1usize, |volume, dim| {
         volume.checked_mul(usize::try_from(*dim).ok()?)
@@ -99,7 +92,7 @@ fn bounded(name: &str, dims: &[i64]) -> Result<usize, String> {
     let values = volume(dims).filter(|values| *values <= MAX_TENSOR_VALUES);
     values.ok_or_else(|| {
         let name = shown(name);
-        format!("tensor '{name}' is of {dims:?}, at most {MAX_TENSOR_VALUES} values are read")
+        format!("tensor '{name}' has the shape {dims:?}, more than {MAX_TENSOR_VALUES} values")
     })
 }
 
@@ -108,11 +101,11 @@ fn tensor(tensor: &TensorProto) -> Result<(), String> {
     let is_elsewhere = tensor.data_location == Some(DataLocation::External as i32);
     if is_elsewhere || !tensor.external_data.is_empty() {
         return Err(format!(
-            "the values of tensor '{name}' are in another file: save it as one"
+            "the values of tensor '{name}' are in an external file: save the model as one file"
         ));
     }
     let values = bounded(&name, &tensor.dims)?;
-    // The least bytes of a value in each list.
+    // Smallest size of a value in each list.
     let there = [
         tensor.raw_data.len(),
         tensor.float_data.len(),
@@ -125,12 +118,12 @@ fn tensor(tensor: &TensorProto) -> Result<(), String> {
     match there.iter().any(|there| *there >= values) {
         true => Ok(()),
         false => Err(format!(
-            "tensor '{name}' says {values} values and has fewer"
+            "tensor '{name}' states {values} values and has fewer"
         )),
     }
 }
 
-/// Checks what operators make of shapes that are written in the file.
+/// Checks operators whose output shape is given in the file.
 fn made(node: &NodeProto, graph: &GraphProto) -> Result<(), String> {
     let shape = match node.op_type.as_str() {
         "ConstantOfShape" => node.input.first(),
@@ -160,7 +153,7 @@ fn made(node: &NodeProto, graph: &GraphProto) -> Result<(), String> {
     let (numbers, _) = tensor.raw_data.as_chunks::<8>();
     let numbers = numbers.iter().map(|bytes| i64::from_le_bytes(*bytes));
     let dims: Vec<i64> = tensor.int64_data.iter().copied().chain(numbers).collect();
-    // -1 keeps a length.
+    // -1 keeps the length.
     let dims: Vec<i64> = dims
         .into_iter()
         .map(|dim| if dim == -1 { 1 } else { dim })

@@ -1,4 +1,4 @@
-//! Images of colours as tensors: resized, normalised, plane by plane.
+//! Conversion of colour images to tensors: resized, normalised, planar.
 
 use super::network::Size;
 use crate::camera::ImageView;
@@ -12,7 +12,7 @@ pub struct Normalisation {
     pub deviation: [f32; 3],
 }
 
-/// Two neighbours on an axis and the weight of the second.
+/// Two adjacent pixels on an axis and the weight of the second.
 #[derive(Clone, Copy)]
 struct Between {
     first: usize,
@@ -20,7 +20,7 @@ struct Between {
     weight: f32,
 }
 
-/// Places of the centres of `to` pixels among the centres of `from` pixels; ends are held.
+/// Positions of the centres of `to` pixels among the centres of `from` pixels; ends are clamped.
 fn between(from: usize, to: usize) -> Vec<Between> {
     let last = from.saturating_sub(1);
     let scale = from as f32 / to.max(1) as f32;
@@ -36,12 +36,12 @@ fn between(from: usize, to: usize) -> Vec<Between> {
     (0..to).map(place).collect()
 }
 
-/// Rows of the image that were read, as numbers from 0 to 1.
+/// Image rows, converted to 0 to 1.
 struct Rows<'a> {
     view: ImageView<'a>,
     columns: Vec<Between>,
     bytes: Vec<[u8; 3]>,
-    /// The last two rows, at the columns of the network, with their numbers.
+    /// The last two rows, sampled at the network's columns, with their indices.
     kept: [(Option<usize>, Vec<[f32; 3]>); 2],
 }
 
@@ -50,7 +50,7 @@ fn mixed(a: [f32; 3], b: [f32; 3], weight: f32) -> [f32; 3] {
 }
 
 impl Rows<'_> {
-    /// Makes a row be the first (0) or the second (1) of the kept ones; rows go on downwards.
+    /// Converts a row into slot 0 or 1; rows are requested in ascending order.
     fn keep(&mut self, place: usize, row: usize) {
         if place == 0 && self.kept[1].0 == Some(row) {
             self.kept.swap(0, 1);

@@ -1,4 +1,4 @@
-//! Models as files: what every backend reads and checks of them.
+//! Reading and validation of model files, common to all backends.
 
 use std::fs::File;
 use std::io::{self, Cursor, Read};
@@ -13,10 +13,10 @@ use super::checks::{self, MAX_TENSOR_VALUES};
 use super::names;
 use super::network::{ModelError, Network, Size, Values};
 
-/// Largest model that is read, bytes: the format holds no more than 2 GiB.
+/// Largest model file, bytes: the format is limited to 2 GiB.
 const MAX_MODEL_BYTES: u64 = 1 << 30;
 
-/// Opens a regular file: of a pipe or a device nobody knows when it answers.
+/// Opens a regular file: pipes and devices could block.
 pub(super) fn open(path: &Path) -> io::Result<File> {
     // Without waiting for the writer of a pipe.
     let flags = OFlags::RDONLY | OFlags::NONBLOCK | OFlags::CLOEXEC;
@@ -52,7 +52,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, ModelError> {
     Ok(read)
 }
 
-/// The graph of a file, checked, and the names of its classes.
+/// Validated graph of a file, and its class names.
 pub(super) fn checked(
     bytes: &[u8],
     path: &Path,
@@ -61,7 +61,7 @@ pub(super) fn checked(
 ) -> Result<(ModelProto, Vec<String>), String> {
     let proto = onnx
         .proto_model_for_read(&mut Cursor::new(bytes))
-        .map_err(|_| "this is no ONNX file".to_owned())?;
+        .map_err(|_| "not an ONNX file".to_owned())?;
     checks::model(&proto, known)?;
     let metadata = proto.metadata_props.iter();
     let metadata = metadata.map(|entry| (entry.key.as_str(), entry.value.as_str()));
@@ -69,7 +69,7 @@ pub(super) fn checked(
     Ok((proto, names))
 }
 
-/// Size of the images that a model takes: its own (1 x 3 x rows x columns), or the given one where that is open;
+/// Input size of a model: its own (1 x 3 x rows x columns), or the given one if that is dynamic;
 /// `None`: another shape.
 pub(super) fn input_size(
     dims: &[Option<usize>],
@@ -83,9 +83,9 @@ pub(super) fn input_size(
     }
     let own = |own: Option<usize>, given: Option<usize>| match (own, given) {
         (Some(own), Some(given)) if own != given => Err(format!(
-            "its input has {own} pixels, not {given} as `input_size` says"
+            "its input has {own} pixels, but `input_size` is {given}"
         )),
-        (None, None) => Err("it leaves the size of its input open: set `input_size`".to_owned()),
+        (None, None) => Err("its input size is dynamic: set `input_size`".to_owned()),
         (own, given) => Ok(own.or(given).unwrap_or(1)),
     };
     let size = || {
@@ -102,7 +102,7 @@ pub(super) fn input_size(
     Some(size())
 }
 
-/// Runs a network once, so that what does not fit shows at the start.
+/// Runs a network once, so that mismatches appear at the start.
 pub(super) fn tried<N: Network>(network: N) -> Result<N, String> {
     let scores = network.run(vec![0.0; 3 * network.input().pixels()])?;
     let names = network.names().len();
@@ -114,10 +114,10 @@ pub(super) fn tried<N: Network>(network: N) -> Result<N, String> {
     }
 }
 
-/// Refusal of an output that is neither scores nor classes.
+/// Error for an output that is neither scores nor classes.
 pub(super) fn other_output(kind: impl std::fmt::Debug, shape: impl std::fmt::Debug) -> String {
     format!(
-        "its output is {kind:?} of {shape:?}, expected scores of 1 x classes x rows x columns or whole numbers of 1 x \
+        "its output is {kind:?} of {shape:?}, expected scores of 1 x classes x rows x columns or integers of 1 x \
          rows x columns"
     )
 }

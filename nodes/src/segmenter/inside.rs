@@ -1,4 +1,4 @@
-//! A network inside of another node: what that node starts, hears and shows of it.
+//! Built-in network of another node: its thread, subscriptions and status.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,16 +13,16 @@ use crate::report;
 use crate::start::NodeError;
 use lattice_runtime::params::{ParamError, Params};
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Node, Shutdown, Subscription};
+use lattice_runtime::{Diagnostics, Level, Node, Shutdown, Subscription, SubscriptionExecutor};
 
-/// A network that is ready to work.
+/// A loaded network.
 pub(crate) struct LoadedNetwork {
     segmenter: Segmenter,
     view: NetworkView,
 }
 
 impl LoadedNetwork {
-    /// Reads the model; errors name the parameter that is wrong.
+    /// Loads the model; errors name the invalid parameter.
     pub fn new(
         params: &Params,
         settings: &NetworkSettings,
@@ -35,12 +35,12 @@ impl LoadedNetwork {
         Ok(Self { segmenter, view })
     }
 
-    /// State of the network as the node reads it.
+    /// View of the network's state for the node.
     pub fn view(&self) -> NetworkView {
         self.view.clone()
     }
 
-    /// Starts its thread on the images of a topic; `tell` is called on it.
+    /// Starts its thread on the images of a topic; `tell` receives its events.
     pub fn start(
         self,
         node: &Node,
@@ -55,7 +55,7 @@ impl LoadedNetwork {
     }
 }
 
-/// Subscribes to the images of a topic, plain or those packed as JPEG beside it.
+/// Subscribes to the images of a topic, plain or JPEG-compressed.
 pub(super) fn subscribe(
     node: &Node,
     topic: &str,
@@ -65,14 +65,14 @@ pub(super) fn subscribe(
     Ok(if is_compressed {
         let topic = format!("{topic}/compressed");
         let enter = move |image| enter(Input::Compressed(image));
-        node.subscribe(&topic, Qos::SENSOR, Load::Large, enter)?
+        node.subscribe(&topic, Qos::SENSOR, SubscriptionExecutor::Dedicated, enter)?
     } else {
         let enter = move |image| enter(Input::Plain(image));
-        node.subscribe(topic, Qos::SENSOR, Load::Large, enter)?
+        node.subscribe(topic, Qos::SENSOR, SubscriptionExecutor::Dedicated, enter)?
     })
 }
 
-/// Hands what a network tells over to the thread of its node; labels that find no room are counted as `lost`.
+/// Passes network events to the thread of its node; rejected labels are counted as `lost`.
 pub(crate) fn hand_over<E: Send + 'static>(
     inbox: &Inbox<E>,
     lost: &Arc<AtomicU64>,
@@ -86,7 +86,7 @@ pub(crate) fn hand_over<E: Send + 'static>(
     }
 }
 
-/// State of a network as it was after its last image.
+/// State of a network after its last image.
 #[derive(Clone)]
 pub(crate) struct NetworkView(Arc<Mutex<WorkerState>>);
 
@@ -96,7 +96,7 @@ impl NetworkView {
         state.clone()
     }
 
-    /// Counters of images.
+    /// Image counters.
     pub fn counts(&self) -> SegmenterCounts {
         self.state().counts
     }
@@ -117,9 +117,9 @@ impl NetworkView {
     }
 }
 
-/// State of the labelling of images, with its level, in words.
+/// Status level and text of the labelling.
 pub(super) fn status_of(counts: &SegmenterCounts) -> (Level, String) {
-    // Images that come faster than the network works are no fault.
+    // Skipping images faster than the network is normal.
     let refused = counts.dropped.iter();
     let refused = refused.filter(|(reason, _)| *reason != "skipped");
     let reasons: Vec<String> = refused.map(|(r, n)| format!("{n} {r}")).collect();

@@ -1,4 +1,4 @@
-//! Images of colours as compressed_image_transport packs them: JPEG.
+//! Colour images compressed by compressed_image_transport: JPEG.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -9,13 +9,13 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-/// Error of a JPEG file in a message.
+/// Reason for rejecting a JPEG image.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub(super) enum JpegError {
-    /// Another format.
+    /// Unsupported format.
     #[error("format '{0}', expected jpeg")]
     Format(String),
-    /// More pixels than the parameter allows.
+    /// Pixel count above the limit.
     #[error("{width} x {height} pixels, more than `max_image_pixels` {max}")]
     TooLarge {
         /// Pixels in a row.
@@ -25,13 +25,13 @@ pub(super) enum JpegError {
         /// The limit.
         max: usize,
     },
-    /// A file that cannot be read to its end.
+    /// Damaged file.
     #[error("its JPEG file: {0}")]
     File(String),
 }
 
 impl JpegError {
-    /// Name under which it is counted.
+    /// Counter name.
     pub(super) fn name(&self) -> &'static str {
         match self {
             Self::Format(_) => "encoding",
@@ -41,15 +41,15 @@ impl JpegError {
     }
 }
 
-/// The image in a message as rgb8, with the header of the message.
+/// Decoded image as rgb8, with the header of the message.
 pub(super) fn image(message: &CompressedImage, max: usize) -> Result<Image, JpegError> {
     if !message.data.starts_with(&[0xff, 0xd8]) {
         let format = message.format.chars().take(32).collect();
         return Err(JpegError::Format(format));
     }
-    // Whatever a file makes of the library, it ends here.
+    // The decoder may panic on damaged files.
     let read = catch_unwind(AssertUnwindSafe(|| pixels(&message.data, max)));
-    let read = read.unwrap_or_else(|_| Err(JpegError::File("it cannot be read".to_owned())));
+    let read = read.unwrap_or_else(|_| Err(JpegError::File("it cannot be decoded".to_owned())));
     let (width, height, data) = read?;
     Ok(Image {
         header: message.header.clone(),

@@ -1,4 +1,4 @@
-//! Output of a network as images: the class of each pixel, and how sure that is.
+//! Conversion of network output to images: class and confidence of each pixel.
 
 use lattice_msgs::sensor_msgs::Image;
 use lattice_msgs::std_msgs::Header;
@@ -6,31 +6,31 @@ use lattice_msgs::std_msgs::Header;
 use super::network::{Scores, Size, Values};
 use crate::camera::{SHARES, Share, SoftLabels};
 
-/// Meaning of the scores of a network.
+/// Interpretation of network scores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Meaning {
     /// Probabilities are their softmax.
     Logits,
-    /// They are probabilities.
+    /// Scores are probabilities.
     Probabilities,
 }
 
-/// Number of pixels without a class in images of 16 bits; 255 in those of a byte.
+/// Label of pixels without a class in 16-bit images; 255 in 8-bit ones.
 const NONE: u16 = u16::MAX;
 
-/// Images of an output, with the header of the image that was labelled.
+/// Output images with the header of the labelled image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Labelled {
-    /// mono8 with fewer than 256 classes, else mono16.
+    /// mono8 for fewer than 256 classes, else mono16.
     pub labels: Image,
-    /// mono8, 255 for certain; none if the network gives classes only.
+    /// mono8, 255 is certain; `None` if the network outputs classes only.
     pub confidence: Option<Image>,
-    /// Probabilities of the best classes, if they were asked for and the network gives scores.
+    /// Probabilities of the best classes, if requested and available.
     pub soft: Option<SoftLabels>,
 }
 
-/// Images of an output. `classes` is the number of names, where there are some; `with_soft` asks for the
-/// probabilities of more classes than the best.
+/// Converts network output. `classes` is the number of class names, if any; `with_soft` requests the
+/// probabilities of several classes.
 pub fn labelled(
     header: &Header,
     scores: &Scores,
@@ -51,7 +51,7 @@ pub fn labelled(
                 let size = [scores.size.width, scores.size.height];
                 soft = SoftLabels::new(size, *classes, shares);
             }
-            // Where nothing is known the cast makes it 0.
+            // The cast converts NaN to 0.
             let bytes = probabilities.iter().map(|p| (p * 255.0).round() as u8);
             (numbers, Some(bytes.collect()), *classes)
         }
@@ -81,7 +81,7 @@ pub fn labelled(
     })
 }
 
-/// The best class of each pixel and its probability. NaN is never best.
+/// Best class of each pixel and its probability. NaN is never best.
 fn chosen(values: &[f32], pixels: usize, meaning: Meaning) -> (Vec<u16>, Vec<f32>) {
     let mut best = vec![f32::NEG_INFINITY; pixels];
     let mut numbers = vec![NONE; pixels];
@@ -108,7 +108,7 @@ fn chosen(values: &[f32], pixels: usize, meaning: Meaning) -> (Vec<u16>, Vec<f32
     (numbers, probabilities)
 }
 
-/// The best classes of each pixel with their probabilities, given that of the best.
+/// Best classes of each pixel with their probabilities, given that of the best.
 fn shares(values: &[f32], best: &[f32], meaning: Meaning) -> Vec<[Share; SHARES]> {
     let mut kept = vec![[(f32::NEG_INFINITY, NONE); SHARES]; best.len()];
     for (plane, class) in values.chunks_exact(best.len()).zip(0..NONE) {

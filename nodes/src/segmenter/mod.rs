@@ -1,6 +1,6 @@
-//! From the images of a camera to labels, by a network.
+//! `segmenter`: labels camera images with a neural network.
 //!
-//! [`Segmenter`] is a state machine without I/O; [`node`] runs it behind DDS.
+//! [`Segmenter`] is a state machine without I/O; [`node`] connects it to DDS.
 
 #[cfg(feature = "onnx")]
 mod checks;
@@ -45,9 +45,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::camera::{Content, ImageView};
 
-/// The network of a file, run by tract. `size` is that of its input where the file leaves it open.
+/// Loads the network of a file for tract. `size` is its input size if dynamic.
 ///
-/// Errors name the file and what is wrong with it; without the feature `onnx` there is no network.
+/// Errors name the file and the problem; without the feature `onnx` no network can be loaded.
 pub fn read_network(
     path: &Path,
     size: Option<Size>,
@@ -56,7 +56,7 @@ pub fn read_network(
     read_network_by(Backend::Tract, path, size, threads)
 }
 
-/// The network of a file, run by a library that the program has.
+/// Loads the network of a file with one of the available backends.
 #[cfg_attr(
     not(feature = "onnx"),
     expect(unused_variables, reason = "there is no backend")
@@ -81,7 +81,7 @@ pub fn read_network_by(
     }
 }
 
-/// An image that is packed as JPEG, as rgb8; else the reason and the problem. Checked before room is made for it.
+/// Decodes a JPEG image to rgb8, or returns reason and text of its rejection. Its size is checked before allocation.
 #[cfg_attr(
     not(feature = "onnx"),
     expect(unused_variables, reason = "there is no decoder")
@@ -101,21 +101,21 @@ pub(crate) fn unpacked(
 pub struct SegmenterCounts {
     /// Images received.
     pub images_in: u64,
-    /// Label images made.
+    /// Label images produced.
     pub labels_out: u64,
-    /// Images refused or dropped, by reason.
+    /// Images rejected or dropped, by reason.
     pub dropped: BTreeMap<String, u64>,
 }
 
-/// The end of a `segmenter`.
+/// Report of a `segmenter`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SegmenterReport {
-    /// Everything counted by the state machine.
+    /// Counters of the state machine.
     #[serde(flatten)]
     pub counts: SegmenterCounts,
-    /// Images that were sent and lost on the way.
+    /// Images lost on the network.
     pub images_lost: u64,
-    /// Samples that did not decode.
+    /// Undecodable samples.
     pub undecodable: u64,
 }
 
@@ -128,7 +128,7 @@ pub struct Segmenter {
 }
 
 impl Segmenter {
-    /// A machine that has seen nothing.
+    /// Initial state.
     pub fn new(options: SegmenterOptions, network: Box<dyn Network>) -> Self {
         Self {
             options,
@@ -138,12 +138,12 @@ impl Segmenter {
         }
     }
 
-    /// Goes on with other options.
+    /// Changes the options.
     pub fn set_options(&mut self, options: SegmenterOptions) {
         self.options = options;
     }
 
-    /// Labels an image. Checked before anything is made of it.
+    /// Labels an image after validation.
     pub fn on_image(&mut self, image: &Image) -> Option<Labelled> {
         self.counts.images_in += 1;
         let view = match ImageView::new(image, Content::Colors, self.options.max_image_pixels) {
@@ -175,18 +175,18 @@ impl Segmenter {
         }
     }
 
-    /// True of an image that [`Segmenter::on_image`] does not refuse before the network sees it.
+    /// True if [`Segmenter::on_image`] would pass the image to the network.
     pub(crate) fn can_read(&self, image: &Image) -> bool {
         ImageView::new(image, Content::Colors, self.options.max_image_pixels).is_ok()
     }
 
-    /// Labels an image that is packed as JPEG.
+    /// Labels a JPEG-compressed image.
     pub fn on_compressed(&mut self, message: &CompressedImage) -> Option<Labelled> {
         let image = self.unpack(message)?;
         self.on_image(&image)
     }
 
-    /// Unpacks a JPEG file; one that cannot be is refused.
+    /// Decodes a JPEG image; an invalid one is rejected.
     pub(crate) fn unpack(&mut self, message: &CompressedImage) -> Option<Arc<Image>> {
         match unpacked(message, self.options.max_image_pixels) {
             Ok(image) => Some(Arc::new(image)),
@@ -198,7 +198,7 @@ impl Segmenter {
         }
     }
 
-    /// Counts images for which newer ones came while the network was at work.
+    /// Counts images skipped for newer ones while the network was busy.
     pub fn skip(&mut self, images: u64) {
         if images > 0 {
             self.counts.images_in += images;
@@ -206,7 +206,7 @@ impl Segmenter {
         }
     }
 
-    /// Names of the classes: given ones, or those of the model; none if nobody names them.
+    /// Class names: from parameters, or of the model; `None` if there are none.
     pub fn label_info(&self) -> Option<LabelInfo> {
         let numbered = self.names().iter().zip(0u16..);
         let classes = numbered.filter(|(name, _)| !name.is_empty());
@@ -235,14 +235,14 @@ impl Segmenter {
         &self.counts
     }
 
-    /// The last refusal in words.
+    /// Text of the last rejection.
     pub fn problem(&self) -> Option<&str> {
         self.problem.as_deref()
     }
 
     fn refuse(&mut self, reason: &str, problem: String) {
         *self.counts.dropped.entry(reason.to_owned()).or_default() += 1;
-        log::debug!("image refused: {problem}");
+        log::debug!("image rejected: {problem}");
         self.problem = Some(problem);
     }
 }

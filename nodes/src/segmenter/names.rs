@@ -1,4 +1,4 @@
-//! Names of the classes of a model: its metadata, or the configuration beside it.
+//! Class names of a model, from its metadata or its configuration file.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -8,16 +8,16 @@ use serde::Deserialize;
 
 use super::network::MAX_CLASSES;
 
-/// Most bytes of names that are read.
+/// Limit of names text, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Names in one of the forms in which they are written.
+/// Class names in one of the usual forms.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Written {
     List(Vec<String>),
     Numbered(BTreeMap<u16, String>),
-    /// As JSON has it, where keys are texts.
+    /// JSON object, whose keys are texts.
     Keyed(BTreeMap<String, String>),
 }
 
@@ -43,7 +43,7 @@ impl Written {
     }
 }
 
-/// Names as a text: a list or a map of YAML, or words between commas.
+/// Parses names: a YAML list or map, or comma-separated words.
 fn read(text: &str) -> Option<Vec<String>> {
     if text.len() as u64 > MAX_BYTES {
         return None;
@@ -55,14 +55,14 @@ fn read(text: &str) -> Option<Vec<String>> {
     }
 }
 
-/// Names by the metadata of a model (`names`, `class_names`), or by `id2label` of a `config.json` beside it.
+/// Names from the metadata of a model (`names`, `class_names`), or from `id2label` of a `config.json` beside it.
 pub(super) fn of_model<'a>(
     metadata: impl Iterator<Item = (&'a str, &'a str)>,
     model: &Path,
 ) -> Result<Vec<String>, String> {
     let mut metadata = metadata.filter(|(key, _)| ["names", "class_names"].contains(key));
     if let Some((key, text)) = metadata.next() {
-        return read(text).ok_or_else(|| format!("its metadata `{key}` are no names of classes"));
+        return read(text).ok_or_else(|| format!("its metadata `{key}` are not class names"));
     }
     beside(&model.with_file_name("config.json"))
 }
@@ -87,7 +87,7 @@ fn beside(path: &Path) -> Result<Vec<String>, String> {
         None => Ok(Vec::new()),
         Some(written) => written.names().ok_or_else(|| {
             let path = path.display();
-            format!("`id2label` of {path} has no names by numbers")
+            format!("`id2label` of {path} does not map numbers to names")
         }),
     }
 }

@@ -1,10 +1,10 @@
-//! Networks as the node sees them: a tensor of colours in, scores or classes of pixels out.
+//! Network interface: a colour tensor in, scores or classes of pixels out.
 
 use std::path::PathBuf;
 
 use thiserror::Error;
 
-/// Most classes: their numbers have 16 bits, and one is none.
+/// Limit of classes: their numbers have 16 bits, and one is reserved.
 pub(super) const MAX_CLASSES: usize = u16::MAX as usize;
 
 /// Size of an image or of the output of a network, pixels.
@@ -17,7 +17,7 @@ pub struct Size {
 }
 
 impl Size {
-    /// Pixels in all.
+    /// Number of pixels.
     pub fn pixels(self) -> usize {
         self.width.saturating_mul(self.height)
     }
@@ -26,33 +26,33 @@ impl Size {
 /// Library that runs a network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Backend {
-    /// tract, which is built in with the feature `onnx`.
+    /// tract, built in with the feature `onnx`.
     #[default]
     Tract,
-    /// ONNX Runtime, a library that is loaded, with the feature `ort`.
+    /// ONNX Runtime, a dynamically loaded library, with the feature `ort`.
     Ort,
 }
 
 impl Backend {
-    /// All, by the names that parameters and options have for them.
+    /// All backends, by their names in parameters and options.
     pub const ALL: [(&'static str, Self); 2] = [("tract", Self::Tract), ("ort", Self::Ort)];
 }
 
 /// Output of a network, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
-    /// A value of each class: all pixels of the first, all of the second and so on.
+    /// Scores by class, planar.
     Scores {
         /// Number of classes, at least 1.
         classes: usize,
         /// `classes` times the pixels.
         values: Vec<f32>,
     },
-    /// The class of each pixel; the network has chosen.
+    /// Class of each pixel, chosen by the network.
     Classes(Vec<i64>),
 }
 
-/// Output of a network with its size, which need not be that of its input.
+/// Output of a network with its size, which may differ from that of its input.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scores {
     /// Size of the output.
@@ -61,24 +61,24 @@ pub struct Scores {
     pub values: Values,
 }
 
-/// Error of a model that cannot be used.
+/// Reason why a model cannot be used.
 #[derive(Debug, Error)]
 pub enum ModelError {
-    /// The program does not have the backend.
+    /// The backend is not built in.
     #[error("this program was built without the feature `{0}`: build it with `--features {0}`")]
     NotBuilt(&'static str),
-    /// The library of ONNX Runtime cannot be used.
+    /// The ONNX Runtime library is unusable.
     #[error("ONNX Runtime: {0}")]
     Library(String),
-    /// The file cannot be read.
+    /// The file is unreadable.
     #[error("{}: {error}", path.display())]
     File {
         /// Its path.
         path: PathBuf,
-        /// Why not.
+        /// Error of the system.
         error: std::io::Error,
     },
-    /// More bytes than are read.
+    /// File size above the limit.
     #[error("{}: {bytes} bytes, more than {max}", path.display())]
     Large {
         /// Its path.
@@ -88,26 +88,26 @@ pub enum ModelError {
         /// The limit.
         max: u64,
     },
-    /// It is no model, or one that asks for what is not offered.
+    /// Not a model, or an unsupported one.
     #[error("{}: {problem}", path.display())]
     Unusable {
         /// Path of the model.
         path: PathBuf,
-        /// What is wrong with it.
+        /// What is wrong.
         problem: String,
     },
 }
 
 /// A network that labels images.
 pub trait Network: Send {
-    /// Size of the images that it takes.
+    /// Input size.
     fn input(&self) -> Size;
 
-    /// Names of its classes by their numbers; empty if it does not say.
+    /// Class names by their numbers; empty if unknown.
     fn names(&self) -> &[String];
 
-    /// Output for an image: red, green and blue planes of the size of the input, normalised.
+    /// Output for an image: red, green and blue planes of the input size, normalised.
     ///
-    /// Errors: the network cannot be run, or its output is of another kind than it says.
+    /// Errors: inference fails, or the output differs from its declaration.
     fn run(&self, planes: Vec<f32>) -> Result<Scores, String>;
 }

@@ -1,4 +1,4 @@
-//! The machine as a ROS node: a thin shell around [`Segmenter`].
+//! ROS node around [`Segmenter`].
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -19,7 +19,7 @@ use lattice_runtime::{Diagnostics, Losses, Publisher, Runtime};
 
 /// Event for the compute thread.
 enum Event {
-    /// There is an image in the slot.
+    /// An image is in the slot.
     Image,
     Diagnose,
     Settings(Box<SegmenterOptions>),
@@ -36,7 +36,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     };
     let network = network.read(params, &runtime.shutdown_handle())?;
     let (slot, losses) = (Arc::new(Slot::default()), Losses::default());
-    let shell = Shell {
+    let compute_state = ComputeState {
         machine: Segmenter::new(settings.segmenter, network),
         slot: Arc::clone(&slot),
         labels: node.publisher("labels/image", Qos::SCANS)?,
@@ -49,17 +49,17 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         warned: 0,
         report_file: settings.report_file,
     };
-    shell.tell_names();
-    let mut shell = shell;
+    compute_state.publish_names();
+    let mut compute_state = compute_state;
     let shutdown = runtime.shutdown_handle();
     let compute = Compute::spawn(name, settings.limits, shutdown, move |event| {
-        shell.on(event)
+        compute_state.on(event)
     })?;
     let inbox = compute.inbox();
     let wake = inbox.clone();
     let on_image = move |image: Input| {
         if slot.put(image) && !wake.send(Event::Image, 0) {
-            // The next one finds the place empty.
+            // The next image notifies again.
             slot.take_back();
         }
     };
@@ -81,7 +81,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     machine: Segmenter,
     slot: Arc<Slot>,
     labels: Publisher<Image>,
@@ -89,21 +89,21 @@ struct Shell {
     label_info: Publisher<LabelInfo>,
     diagnostics: Diagnostics,
     losses: Losses,
-    /// Time of the last image in the network, seconds.
+    /// Inference time of the last image, seconds.
     last_s: f64,
     warnings: Throttle,
-    /// Images refused when there was a warning last.
+    /// Rejected images at the last warning.
     warned: u64,
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Image => self.label(),
             Event::Settings(options) => {
                 self.machine.set_options(*options);
-                self.tell_names();
+                self.publish_names();
             }
             Event::Diagnose => self.diagnose(),
             Event::Finish => {
@@ -136,7 +136,7 @@ impl Shell {
         }
     }
 
-    fn tell_names(&self) {
+    fn publish_names(&self) {
         if let Some(info) = self.machine.label_info()
             && let Err(error) = self.label_info.publish(Arc::new(info))
         {
@@ -163,7 +163,7 @@ impl Shell {
             && self.warnings.check().is_some()
         {
             self.warned = refused;
-            log::warn!("{message}; last refused: {problem}");
+            log::warn!("{message}; last rejection: {problem}");
         }
         let mut values = report::key_values(&report);
         values.push(("last_image_s".into(), format!("{:.4}", self.last_s)));

@@ -1,4 +1,4 @@
-//! Networks in ONNX files, run by the library of ONNX Runtime.
+//! ONNX networks, run by the ONNX Runtime library.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -12,10 +12,10 @@ use ort::value::{DynValue, TensorElementType, TensorRef};
 use super::network::{ModelError, Network, Scores, Size, Values};
 use super::{checks, file, sizes};
 
-/// Name of the library where `ORT_DYLIB_PATH` names none.
+/// Library name unless `ORT_DYLIB_PATH` is set.
 const LIBRARY: &str = "libonnxruntime.so";
 
-/// A network of a file in a session of ONNX Runtime.
+/// Network of a file in an ONNX Runtime session.
 pub(super) struct OrtNetwork {
     session: Mutex<Session>,
     input: Size,
@@ -23,9 +23,9 @@ pub(super) struct OrtNetwork {
 }
 
 impl OrtNetwork {
-    /// Reads the model of a file, as tract's backend does; the library is loaded with the first.
+    /// Loads the model of a file as tract's backend does; the first call loads the library.
     ///
-    /// Errors: there is no library, or one that is too old; else they name the file and what is wrong.
+    /// Errors: the library is missing or too old; else they name the file and the problem.
     pub(super) fn read(
         path: &Path,
         size: Option<Size>,
@@ -33,9 +33,9 @@ impl OrtNetwork {
     ) -> Result<Self, ModelError> {
         load().map_err(ModelError::Library)?;
         let bytes = file::read(path)?;
-        // Whatever a graph makes of the library, it ends here.
+        // The library may panic on invalid graphs.
         let made = catch_unwind(AssertUnwindSafe(|| made_of(&bytes, path, size, threads)));
-        let made = made.unwrap_or_else(|_| Err("the graph cannot be read".to_owned()));
+        let made = made.unwrap_or_else(|_| Err("the graph cannot be parsed".to_owned()));
         made.map_err(|problem| ModelError::Unusable {
             path: path.to_owned(),
             problem,
@@ -67,11 +67,11 @@ impl Network for OrtNetwork {
     }
 }
 
-/// Loads the library, once for the process.
+/// Loads the library once per process.
 fn load() -> Result<(), String> {
     let path = std::env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty());
     let path = path.map_or_else(|| PathBuf::from(LIBRARY), PathBuf::from);
-    // A path from here; a name alone is looked for where libraries are.
+    // A path is relative to the working directory; a bare name is searched in the library path.
     let path = match path.components().count() {
         0 | 1 => path,
         _ => std::path::absolute(&path).unwrap_or(path),
@@ -79,16 +79,16 @@ fn load() -> Result<(), String> {
     let loaded = catch_unwind(AssertUnwindSafe(|| -> Result<(), String> {
         let environment = ort::init_from(&path).map_err(|error| error.to_string())?;
         environment.commit();
-        // The interface of the version that is asked for: there is none in a library that is too old.
+        // Panics if the library is older than the required version.
         let _ = ort::api();
         Ok(())
     }));
-    let loaded =
-        loaded.unwrap_or_else(|_| Err("it has not the interface that is asked for".to_owned()));
+    let loaded = loaded
+        .unwrap_or_else(|_| Err("it does not have the required interface version".to_owned()));
     loaded.map_err(|problem| {
         let path = path.display();
         let problem = checks::shown(&problem);
-        format!("{path}: {problem}; ORT_DYLIB_PATH names the library, version 1.17 or later")
+        format!("{path}: {problem}; set ORT_DYLIB_PATH to the library, version 1.17 or later")
     })
 }
 
@@ -99,15 +99,15 @@ fn made_of(
     threads: usize,
 ) -> Result<OrtNetwork, String> {
     let onnx = tract_onnx::onnx();
-    // It says itself which operators it does not know.
+    // The library itself rejects unknown operators.
     let (proto, names) = file::checked(bytes, path, &onnx, |_| true)?;
     let known = |operator: &str| onnx.op_register.0.contains_key(operator);
     if checks::model(&proto, known).is_ok() {
-        // Sizes that only the shapes tell; what tract cannot read of these is left to the library.
+        // Sizes from shape inference; graphs that tract cannot analyse are left to the library.
         match sizes::analysed(&onnx, &proto, size) {
             Err(sizes::Problem::Size(problem)) => return Err(problem),
             Err(sizes::Problem::Other(problem)) => log::warn!(
-                "{}: the sizes of its tensors are not bounded, as they are not known before: {problem}",
+                "{}: the sizes of its tensors are unknown and not checked: {problem}",
                 path.display()
             ),
             Ok(_) => {}
@@ -130,7 +130,7 @@ fn made_of(
     })
 }
 
-/// Size of the images that a model takes.
+/// Input size of a model.
 fn input_of(session: &Session, size: Option<Size>) -> Result<Size, String> {
     let [input] = session.inputs() else {
         let inputs = session.inputs().len();
@@ -147,7 +147,7 @@ fn input_of(session: &Session, size: Option<Size>) -> Result<Size, String> {
     file::input_size(&dims, size).unwrap_or_else(|| Err(wrong()))
 }
 
-/// Output as scores (1 x classes x rows x columns) or classes (1 x rows x columns, with another 1 or not).
+/// Output as scores (1 x classes x rows x columns) or classes (1 x rows x columns, optionally with another 1).
 fn scores_of(output: &DynValue) -> Result<Scores, String> {
     let kind = output.dtype();
     let dims = kind.tensor_shape().map(|shape| shape.to_vec());
@@ -189,7 +189,7 @@ where
     Ok(values.iter().map(|v| value(*v)).collect())
 }
 
-/// The error on one line.
+/// Error text on one line.
 fn in_words<R>(error: ort::Error<R>) -> String {
     checks::shown(&error.to_string())
 }

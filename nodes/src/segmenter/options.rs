@@ -6,21 +6,21 @@ use super::network::{MAX_CLASSES, Size};
 use crate::options::one_of;
 use lattice_runtime::params::{ParamError, Params};
 
-/// Largest side of the input of a network that a parameter may ask for.
+/// Largest settable side of a network input, pixels.
 const MAX_SIDE: i64 = 1 << 14;
 
 /// Options of a [`super::Segmenter`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct SegmenterOptions {
-    /// Images of more pixels are refused.
+    /// Larger images are rejected, pixels.
     pub max_image_pixels: usize,
     /// Normalisation of the colours.
     pub normalisation: Normalisation,
-    /// Meaning of the scores.
+    /// Interpretation of the scores.
     pub meaning: Meaning,
-    /// Names of the classes; empty: those of the model.
+    /// Class names; empty: those of the model.
     pub names: Vec<String>,
-    /// True if the probabilities of more classes than the best are wanted.
+    /// True to output the probabilities of several classes.
     pub with_soft: bool,
 }
 
@@ -47,7 +47,7 @@ impl SegmenterOptions {
         Self::of_network(params, max_image_pixels, false)
     }
 
-    /// Reads what belongs to the network.
+    /// Reads the parameters of the network.
     pub(crate) fn of_network(
         params: &Params,
         max_image_pixels: usize,
@@ -80,7 +80,7 @@ impl SegmenterOptions {
     }
 }
 
-/// Three numbers, of red, green and blue.
+/// Reads three numbers: red, green and blue.
 fn channels(params: &Params, name: &str, default: [f32; 3]) -> Result<[f32; 3], ParamError> {
     let default = default.map(|v| (f64::from(v) * 1e6).round() / 1e6);
     let given = params.f64_array(name, &default)?;
@@ -91,7 +91,7 @@ fn channels(params: &Params, name: &str, default: [f32; 3]) -> Result<[f32; 3], 
     Ok(numbers.map(|v| v as f32))
 }
 
-/// `input_size`: size of the input where the model leaves it open.
+/// `input_size`: size of the input if the model's is dynamic.
 pub(super) fn input_size(params: &Params) -> Result<Option<Size>, ParamError> {
     let side = |v: i64| {
         usize::try_from(v)

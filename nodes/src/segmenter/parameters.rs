@@ -1,4 +1,4 @@
-//! All parameters of the node.
+//! Parameters of the node.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -15,30 +15,30 @@ use lattice_runtime::{Shutdown, about};
 
 const MODEL: &str = "the network is made at the start";
 const ABOUT: &[About] = about! {
-    "model" fixed(MODEL): "The network, an ONNX file: one image in (1 x 3 x rows x columns), scores of classes or classes out.";
+    "model" fixed(MODEL): "Network, an ONNX file: one image in (1 x 3 x rows x columns), scores of classes or classes out.";
     "compressed" fixed(options::TOPIC): "Whether images are taken from rgb/image_rect_color/compressed (JPEG).";
-    "max_image_pixels": "Images of more pixels are refused.";
+    "max_image_pixels": "Limit of pixels per image; larger images are rejected.";
 };
 
-/// Parameters of a network, whichever node runs it.
+/// Parameters of a network, in any node.
 pub(crate) const NETWORK: &[About] = about! {
     "model" fixed(MODEL): "A network that labels the images of colours inside this node, an ONNX file as segmenter takes it; empty: labels come from a topic.";
     "backend" fixed(MODEL): "What runs the network: tract, which is built in, or ort, the library of ONNX Runtime that ORT_DYLIB_PATH names (feature ort).";
-    "input_size" fixed(MODEL): "Width and height of the images that the network takes, where its file leaves them open.";
-    "mean": "Means of red, green and blue, for colours from 0 to 1, as the network was trained with.";
-    "std": "Standard deviations of red, green and blue, likewise.";
+    "input_size" fixed(MODEL): "Input width and height of the network, if dynamic in its file.";
+    "mean": "Means of red, green and blue, for colours from 0 to 1, as in the training of the network.";
+    "std": "Standard deviations of red, green and blue, as in the training of the network.";
     "scores": "Whether the scores of the network are logits or probabilities.";
-    "names": "Names of the classes in the order of their numbers; none: those of the model.";
+    "names": "Class names in the order of their numbers; none: those of the model.";
     "label_probs": "Whether points have label_probs, the probabilities of the four best classes of their pixel, with model.";
-    "compressed_color" fixed(options::TOPIC): "Whether images of colours are taken packed (JPEG), from the topic with /compressed behind its name.";
+    "compressed_color" fixed(options::TOPIC): "Whether colour images are compressed (JPEG), on the topic with the suffix /compressed.";
 };
 
-/// Longest time in which a network is made ready, about as long as somebody waits for a node to start.
+/// Timeout of loading a network, about as long as an operator waits for a node to start.
 const MAX_LOAD: Duration = Duration::from_secs(60);
-/// Time between two looks at the request to end.
+/// Period of checks for a shutdown request.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Result of `make`, on a thread of its own that is left alone if it does not end in time or the process is to.
+/// Result of `make` on a separate thread, which is abandoned at the timeout or a shutdown request.
 fn within<T: Send + 'static>(
     most: Duration,
     shutdown: &Shutdown,
@@ -48,7 +48,7 @@ fn within<T: Send + 'static>(
     let thread = thread::Builder::new().name("read network".to_owned());
     thread
         .spawn(move || {
-            // Nobody may wait for it any more.
+            // The receiver may be gone.
             let _ = done.send(make());
         })
         .map_err(|error| error.to_string())?;
@@ -56,14 +56,14 @@ fn within<T: Send + 'static>(
     loop {
         match made.recv_timeout(POLL) {
             Ok(made) => return Ok(made),
-            Err(RecvTimeoutError::Disconnected) => return Err("it cannot be read".to_owned()),
+            Err(RecvTimeoutError::Disconnected) => return Err("it cannot be parsed".to_owned()),
             Err(RecvTimeoutError::Timeout) if shutdown.is_requested() => {
                 return Err("reading it was interrupted".to_owned());
             }
             Err(RecvTimeoutError::Timeout) if begin.elapsed() > most => {
                 let seconds = most.as_secs_f64();
                 return Err(format!(
-                    "it is not ready after {seconds} s: take a smaller one"
+                    "loading takes more than {seconds} s: use a smaller model"
                 ));
             }
             Err(RecvTimeoutError::Timeout) => {}
@@ -71,7 +71,7 @@ fn within<T: Send + 'static>(
     }
 }
 
-/// A network by its parameters.
+/// Network settings from parameters.
 #[derive(Clone)]
 pub(crate) struct NetworkSettings {
     model: PathBuf,
@@ -93,7 +93,7 @@ impl NetworkSettings {
         Ok(Some(found).filter(|found| !found.model.as_os_str().is_empty()))
     }
 
-    /// Makes the network within [`MAX_LOAD`], or until the process is to end.
+    /// Loads the network within [`MAX_LOAD`], or until a shutdown request.
     pub(crate) fn read(
         &self,
         params: &Params,
@@ -138,10 +138,10 @@ impl NetworkSettings {
     }
 }
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub segmenter: SegmenterOptions,
-    /// None: no model is given.
+    /// `None`: no model is given.
     pub network: Option<NetworkSettings>,
     pub compressed: bool,
     pub limits: ComputeLimits,
@@ -160,7 +160,7 @@ impl Settings {
             compressed: params.bool("compressed", false)?,
             limits: ComputeLimits {
                 events: 16,
-                // The image that waits is the newest; none other does.
+                // Only the newest image waits.
                 bytes: usize::MAX,
                 threads: 1,
             },
@@ -169,7 +169,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }
@@ -190,7 +190,9 @@ mod tests {
             assert!(begin.elapsed() < Duration::from_secs(2), "{error}");
             error
         };
-        assert!(late(&shutdown, Duration::from_millis(1)).contains("not ready"));
+        assert!(
+            late(&shutdown, Duration::from_millis(1)).contains("loading takes more than 0.001 s")
+        );
         let panics = within(MAX_LOAD, &shutdown, || -> u8 { panic!("on purpose") });
         assert!(panics.is_err());
         shutdown.request();

@@ -1,4 +1,4 @@
-//! Sizes of the tensors of a graph, known before any of them is made.
+//! Tensor sizes of a graph, inferred before allocation.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,14 +13,14 @@ use super::file;
 use super::network::Size;
 use super::tract::first_line;
 
-/// Most rounds in which shapes are passed on; each goes over the whole graph in order.
+/// Limit of shape inference rounds; each covers the whole graph in order.
 const MAX_ROUNDS: usize = 32;
-/// Most values of constants of which something of unknown size may be made.
+/// Limit of constant values as input of a tensor of unknown size.
 const MAX_UNFORESEEN: usize = 1 << 12;
 
 /// Reason why a graph cannot be used.
 pub(super) enum Problem {
-    /// A tensor is too large.
+    /// Tensor size above the limit.
     Size(String),
     /// Anything else.
     Other(String),
@@ -34,8 +34,8 @@ impl From<Problem> for String {
     }
 }
 
-/// The model of a graph with the size of its images and the shapes that follow; tensors beyond any bound are
-/// refused before they are made.
+/// Model of a graph with its input size and the inferred shapes; tensors above the limit are
+/// rejected before allocation.
 pub(super) fn analysed(
     onnx: &Onnx,
     proto: &ModelProto,
@@ -52,16 +52,16 @@ pub(super) fn analysed(
     Ok((model, input))
 }
 
-/// Passes shapes and constants on from node to node. tract computes what depends on constants alone as it goes:
-/// how large that is must be known before.
+/// Propagates shapes and constants from node to node. tract computes constant expressions during analysis,
+/// so their sizes must be known first.
 fn analyse(model: &mut InferenceModel) -> Result<(), Problem> {
     let in_words = |error: TractError| Problem::Other(first_line(&error));
     let mut order = model.eval_order().map_err(in_words)?;
-    // Also what no output depends on.
+    // Includes nodes that no output depends on.
     let reached: BTreeSet<usize> = order.iter().copied().collect();
     let nodes = 0..model.nodes().len();
     order.extend(nodes.filter(|node| !reached.contains(node)));
-    // Values that are made of constants alone: those stay in memory.
+    // Values computed from constants alone, which stay in memory.
     let mut made = BTreeMap::new();
     for _ in 0..MAX_ROUNDS {
         let mut changed = false;
@@ -71,7 +71,7 @@ fn analyse(model: &mut InferenceModel) -> Result<(), Problem> {
                 let all = made.values().fold(0usize, |all, n| all.saturating_add(*n));
                 if all > MAX_TENSOR_VALUES {
                     return Err(Problem::Size(format!(
-                        "{all} values are made of its constants, at most {MAX_TENSOR_VALUES} are"
+                        "{all} values are computed from constants, more than {MAX_TENSOR_VALUES}"
                     )));
                 }
             }
@@ -81,11 +81,11 @@ fn analyse(model: &mut InferenceModel) -> Result<(), Problem> {
             return Ok(());
         }
     }
-    let problem = format!("its shapes are not settled after {MAX_ROUNDS} rounds");
+    let problem = format!("shape inference does not converge within {MAX_ROUNDS} rounds");
     Err(Problem::Size(problem))
 }
 
-/// Facts of the inputs of a node, of its outputs, and of those that it observes beside them.
+/// Facts of a node's inputs, its outputs, and of further nodes that it observes.
 type Facts = [TVec<InferenceFact>; 3];
 
 fn facts(model: &InferenceModel, node: usize) -> TractResult<(Facts, Vec<OutletId>)> {
@@ -104,7 +104,7 @@ fn facts(model: &InferenceModel, node: usize) -> TractResult<(Facts, Vec<OutletI
     Ok((facts, observed_at))
 }
 
-/// Has a node say what follows from the facts around it; true if anything did.
+/// Infers facts at a node; true if any changed.
 fn pass_on(model: &mut InferenceModel, node: usize) -> TractResult<bool> {
     let ([inputs, outputs, observed], observed_at) = facts(model, node)?;
     let op = &mut model.node_mut(node).op;
@@ -129,9 +129,9 @@ fn pass_on(model: &mut InferenceModel, node: usize) -> TractResult<bool> {
     Ok(changed)
 }
 
-/// Checks the sizes of what a node makes, as far as they are known: those that are too large are refused, and those
-/// that are not known where the node is about to be computed. The number of values that are made, where all inputs are
-/// constants.
+/// Checks the output sizes of a node: known ones against the limit, and unknown ones if the node is about to be
+/// computed from constants. Returns the number of values in the latter
+/// case.
 fn foresee(model: &InferenceModel, node: usize) -> Result<Option<usize>, Problem> {
     let in_words = |error: TractError| Problem::Other(first_line(&error));
     let name = || checks::shown(&model.node(node).name);
@@ -164,7 +164,7 @@ fn foresee(model: &InferenceModel, node: usize) -> Result<Option<usize>, Problem
                     .try_fold(1usize, |all, dim| all.checked_mul(*dim));
                 let Some(values) = values.filter(|values| *values <= MAX_TENSOR_VALUES) else {
                     return Err(Problem::Size(format!(
-                        "'{}' makes {dims:?}, at most {MAX_TENSOR_VALUES} values are made",
+                        "'{}' has the output shape {dims:?}, more than {MAX_TENSOR_VALUES} values",
                         name()
                     )));
                 };
@@ -172,7 +172,7 @@ fn foresee(model: &InferenceModel, node: usize) -> Result<Option<usize>, Problem
             }
             (None, Some(values)) if values > MAX_UNFORESEEN => {
                 return Err(Problem::Size(format!(
-                    "the size of what '{}' makes of {values} constants is not known before",
+                    "the output size of '{}' with {values} constant values is unknown",
                     name()
                 )));
             }
@@ -182,21 +182,23 @@ fn foresee(model: &InferenceModel, node: usize) -> Result<Option<usize>, Problem
     Ok(constants.map(|_| made))
 }
 
-/// Checks the tensors of a model of which everything is known.
+/// Checks the tensors of a fully inferred model.
 pub(super) fn bounded(model: &TypedModel) -> Result<(), String> {
     for node in model.nodes() {
         for fact in node.outputs.iter().map(|output| &output.fact) {
             let values = fact.shape.volume().to_usize().unwrap_or(usize::MAX);
             if values > MAX_TENSOR_VALUES {
                 let name = checks::shown(&node.name);
-                return Err(format!("'{name}' has {values} values, more than are made"));
+                return Err(format!(
+                    "'{name}' has {values} values, more than {MAX_TENSOR_VALUES}"
+                ));
             }
         }
     }
     Ok(())
 }
 
-/// Size of the images that a model takes.
+/// Input size of a model.
 fn input_of(model: &InferenceModel, size: Option<Size>) -> Result<Size, String> {
     let [_] = model.inputs.as_slice() else {
         let inputs = model.inputs.len();

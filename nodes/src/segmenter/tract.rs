@@ -1,4 +1,4 @@
-//! Networks in ONNX files, run by tract.
+//! ONNX networks, run by tract.
 
 mod convolution;
 mod planes;
@@ -18,7 +18,7 @@ use tract_onnx::tract_hir::tract_core::runtime::RunOptions;
 use super::network::{ModelError, Network, Scores, Size, Values};
 use super::{checks, file, sizes};
 
-/// A network of a file, made ready for images of one size.
+/// Network of a file, prepared for images of one size.
 pub(super) struct OnnxNetwork {
     plan: Arc<TypedSimplePlan>,
     input: Size,
@@ -26,19 +26,19 @@ pub(super) struct OnnxNetwork {
 }
 
 impl OnnxNetwork {
-    /// Reads the model of a file. `size` is that of its input where the model leaves that open.
+    /// Loads the model of a file. `size` is its input size if dynamic.
     ///
-    /// Errors name the file and what is wrong: no ONNX, operators that there are not, tensors beyond any
-    /// bound, inputs or outputs of another shape than images.
+    /// Errors name the file and the problem: not ONNX, unknown operators, tensors above the
+    /// limit, inputs or outputs that are not images.
     pub(super) fn read(
         path: &Path,
         size: Option<Size>,
         threads: usize,
     ) -> Result<Self, ModelError> {
         let bytes = file::read(path)?;
-        // Whatever a graph makes of the library, it ends here.
+        // The library may panic on invalid graphs.
         let made = catch_unwind(AssertUnwindSafe(|| made_of(bytes, path, size, threads)));
-        let made = made.unwrap_or_else(|_| Err("the graph cannot be read".to_owned()));
+        let made = made.unwrap_or_else(|_| Err("the graph cannot be parsed".to_owned()));
         made.map_err(|problem| ModelError::Unusable {
             path: path.to_owned(),
             problem,
@@ -100,7 +100,7 @@ fn made_of(
     file::tried(OnnxNetwork { plan, input, names })
 }
 
-/// Output as scores (1 x classes x rows x columns) or classes (1 x rows x columns, with another 1 or not).
+/// Output as scores (1 x classes x rows x columns) or classes (1 x rows x columns, optionally with another 1).
 fn scores_of(output: &Tensor) -> Result<Scores, String> {
     let shape = output.shape();
     let in_words = |error: TractError| first_line(&error);
@@ -132,7 +132,7 @@ fn scores_of(output: &Tensor) -> Result<Scores, String> {
     Ok(Scores { size, values })
 }
 
-/// What went wrong, without the operators on the way to it.
+/// First line of an error, without the chain of operators.
 pub(super) fn first_line(error: &TractError) -> String {
     let text = error.chain().map(|cause| checks::shown(&cause.to_string()));
     let text: Vec<String> = text.collect();

@@ -1,4 +1,4 @@
-//! A segmenter on a thread of its own, inside of another node.
+//! Segmenter on a separate thread of another node.
 
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -13,13 +13,13 @@ use crate::camera::LabelSet;
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use lattice_runtime::Shutdown;
 
-/// Image as it came.
+/// Received image.
 pub(crate) enum Input {
     Plain(Arc<Image>),
     Compressed(Arc<CompressedImage>),
 }
 
-/// Place of the newest image; those that it replaces are skipped.
+/// Slot for the newest image; replaced ones are skipped.
 #[derive(Default)]
 pub(super) struct Slot {
     image: Mutex<Option<Input>>,
@@ -27,13 +27,13 @@ pub(super) struct Slot {
 }
 
 impl Slot {
-    /// Puts an image there; true if the place was empty.
+    /// Stores an image; true if the slot was empty.
     pub fn put(&self, image: Input) -> bool {
         let old = {
             let mut slot = self.image.lock().unwrap_or_else(PoisonError::into_inner);
             slot.replace(image)
         };
-        // It is freed without the lock.
+        // Freed without the lock.
         self.skipped
             .fetch_add(u64::from(old.is_some()), Ordering::Relaxed);
         old.is_none()
@@ -44,30 +44,30 @@ impl Slot {
         slot.take()
     }
 
-    /// Takes an image back that nobody could be told of.
+    /// Removes an image whose notification failed.
     pub fn take_back(&self) {
         if self.take().is_some() {
             self.skipped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Images skipped since this was asked last.
+    /// Images skipped since the last call.
     pub fn skipped(&self) -> u64 {
         self.skipped.swap(0, Ordering::Relaxed)
     }
 }
 
-/// Event for the thread of the network.
+/// Event for the network thread.
 enum Event {
-    /// There is an image in the slot.
+    /// An image is in the slot.
     Image,
     Settings(Box<SegmenterOptions>),
     Finish,
 }
 
-/// Event that the thread of a network tells of.
+/// Event from the network thread.
 pub(crate) enum NetworkEvent {
-    /// The network begins with an image of this stamp.
+    /// Inference of an image with this stamp has begun.
     Begun(i64),
     /// An image is labelled; its colours are in the set.
     Labelled(LabelSet),
@@ -76,7 +76,7 @@ pub(crate) enum NetworkEvent {
 }
 
 impl NetworkEvent {
-    /// Bytes that wait in the inbox of the node.
+    /// Bytes for the inbox of the node.
     pub fn bytes(&self) -> usize {
         match self {
             Self::Labelled(labels) => labels.bytes(),
@@ -85,12 +85,12 @@ impl NetworkEvent {
     }
 }
 
-/// State that other threads look at.
+/// State shared with other threads.
 #[derive(Clone, Debug)]
 pub(super) struct WorkerState {
     pub counts: SegmenterCounts,
     pub problem: Option<String>,
-    /// Time of the last image in the network, seconds.
+    /// Inference time of the last image, seconds.
     pub last_s: f64,
     pub label_info: Option<LabelInfo>,
 }
@@ -106,14 +106,14 @@ impl WorkerState {
     }
 }
 
-/// A segmenter on a thread of its own: it labels the newest image, and skips those that newer ones replace.
+/// Segmenter on a separate thread: labels the newest image and skips replaced ones.
 pub(crate) struct Worker {
     compute: Compute<Event>,
     slot: Arc<Slot>,
 }
 
 impl Worker {
-    /// Starts the thread, which shows its state after each image; `tell` is called on it.
+    /// Starts the thread, which publishes its state after each image; `tell` receives its events.
     pub(super) fn spawn(
         name: &str,
         segmenter: Segmenter,
@@ -131,7 +131,7 @@ impl Worker {
         };
         let limits = ComputeLimits {
             events: 16,
-            // The image that waits is the newest; none other does.
+            // Only the newest image waits.
             bytes: usize::MAX,
             threads: 1,
         };
@@ -140,24 +140,24 @@ impl Worker {
         Ok(Self { compute, slot })
     }
 
-    /// A handler that hands images over and returns at once.
+    /// Handler that stores images and returns at once.
     pub fn image_callback(&self) -> impl FnMut(Input) + Send + 'static {
         let (slot, inbox): (_, Inbox<Event>) = (Arc::clone(&self.slot), self.compute.inbox());
         move |image| {
             if slot.put(image) && !inbox.send(Event::Image, 0) {
-                // The next one finds the place empty.
+                // The next image notifies again.
                 slot.take_back();
             }
         }
     }
 
-    /// A function that makes the network go on with other options; `false`: there is no room now.
+    /// Function that changes the options of the network; `false`: the inbox is full.
     pub fn settings(&self) -> impl Fn(SegmenterOptions) -> bool + Send + Sync + 'static {
         let inbox = self.compute.inbox();
         move |options| inbox.send(Event::Settings(Box::new(options)), 0)
     }
 
-    /// Labels the image that waits, and ends the thread.
+    /// Labels the waiting image, and ends the thread.
     pub fn finish(self) {
         self.compute.finish_with(Event::Finish);
     }

@@ -1,28 +1,28 @@
-//! Depth images as compressed_depth_image_transport packs them.
+//! Depth images compressed by compressed_depth_image_transport.
 
 use lattice_msgs::sensor_msgs::{CompressedImage, Image};
 use serde_bytes::ByteBuf;
 use thiserror::Error;
 
-/// Kind of quantization and its two parameters stand before the PNG file.
+/// Header before the PNG data: quantization type and its two parameters.
 const HEADER_BYTES: usize = 12;
 
-/// Error of a packed depth image.
+/// Reason for rejecting a compressed depth image.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum CompressedError {
-    /// A format that is not read.
+    /// Unsupported format.
     #[error(
         "format '{0}', expected 16UC1 or 32FC1 as compressedDepth png (the transport's parameter \
-         `format`; rvl is not read)"
+         `format`; rvl is not supported)"
     )]
     Format(String),
-    /// No header.
+    /// Missing header.
     #[error("{0} bytes, but 12 and a PNG file are needed")]
     Short(usize),
-    /// Parameters without meaning.
+    /// Invalid parameters.
     #[error("the parameters of its quantization are not finite, or the first is not positive")]
     Quantization,
-    /// More pixels than the parameter allows.
+    /// Pixel count above the limit.
     #[error("{width} x {height} pixels, more than `max_image_pixels` {max}")]
     TooLarge {
         /// Pixels in a row.
@@ -32,13 +32,13 @@ pub enum CompressedError {
         /// The limit.
         max: usize,
     },
-    /// The file.
+    /// Damaged PNG data.
     #[error("its PNG file: {0}")]
     Png(String),
 }
 
 impl CompressedError {
-    /// Name under which it is counted.
+    /// Counter name.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Format(_) => "encoding",
@@ -48,7 +48,7 @@ impl CompressedError {
     }
 }
 
-/// The image in a message: 16UC1 as it is, 32FC1 of its quantized inverse depths.
+/// Decoded image: 16UC1 unchanged, 32FC1 from quantized inverse depths.
 pub fn depth_image(message: &CompressedImage, max: usize) -> Result<Image, CompressedError> {
     let (encoding, kind) = message.format.split_once(';').unwrap_or_default();
     let encoding = encoding.trim();
@@ -96,11 +96,11 @@ pub fn depth_image(message: &CompressedImage, max: usize) -> Result<Image, Compr
     })
 }
 
-/// Size and numbers of 16 bits, big endian, of a grey PNG file.
+/// Size and 16-bit big-endian values of a grey PNG file.
 #[cfg(feature = "compressed_depth")]
 fn gray(file: &[u8], max: usize) -> Result<(u32, u32, Vec<u8>), CompressedError> {
     let bad = |error: png::DecodingError| CompressedError::Png(error.to_string());
-    // Two bytes a pixel, and the inflater's own.
+    // Two bytes a pixel, plus the decoder's own buffers.
     let bytes = max.saturating_mul(2).saturating_add(1 << 20);
     let limits = png::Limits { bytes };
     let mut decoder = png::Decoder::new_with_limits(std::io::Cursor::new(file), limits);

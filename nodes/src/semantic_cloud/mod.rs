@@ -1,6 +1,6 @@
-//! From a depth camera and a segmenter to clouds with labels.
+//! `semantic_cloud`: labelled clouds from a depth camera and a segmenter.
 //!
-//! [`SemanticCloud`] is a state machine without I/O; [`node`] runs it behind DDS.
+//! [`SemanticCloud`] is a state machine without I/O; [`node`] connects it to DDS.
 
 #[cfg_attr(
     not(feature = "compressed_depth"),
@@ -34,25 +34,25 @@ use self::waiting::{Left, Set, Waiting};
 use crate::camera::Classes;
 use crate::segmenter;
 
-/// Output of the machine.
+/// Output of the state machine.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CloudOutput {
-    /// For `points`, in the frame of the depth image and of its stamp.
+    /// For `points`, with frame and stamp of the depth image.
     Points(PointCloud2),
-    /// For `label_info`: the names of the classes in `points`.
+    /// For `label_info`: names of the classes in `points`.
     LabelInfo(LabelInfo),
 }
 
-/// Makes a labelled cloud of each depth image and the label image of its time.
+/// Combines each depth image with the label image of its time into a labelled cloud.
 ///
-/// Images are checked before they wait, and nothing is allocated by what their headers say. The newest
-/// `camera_info` holds for all images that it fits.
+/// Images are validated before they are queued, and headers do not determine allocations. The newest
+/// `camera_info` applies to all images that match it.
 pub struct SemanticCloud {
     options: CloudOptions,
     waiting: Waiting,
     info: Option<Arc<CameraInfo>>,
     camera: Option<Camera>,
-    /// Rays of the camera, made with its first image.
+    /// Camera rays, built with its first image.
     rays: Vec<[f32; 2]>,
     label_info: Option<Arc<LabelInfo>>,
     classes: Classes,
@@ -61,7 +61,7 @@ pub struct SemanticCloud {
 }
 
 impl SemanticCloud {
-    /// A machine that has seen nothing.
+    /// Initial state.
     pub fn new(options: CloudOptions) -> Self {
         Self {
             waiting: Waiting::new(options.pair.clone()),
@@ -76,7 +76,7 @@ impl SemanticCloud {
         }
     }
 
-    /// Goes on with other options; the names of the classes are told anew.
+    /// Changes the options; class names are published again.
     pub fn set_options(&mut self, options: CloudOptions) -> Vec<CloudOutput> {
         self.waiting.set_options(options.pair.clone());
         self.classes.set_rules(&options.classes);
@@ -87,7 +87,7 @@ impl SemanticCloud {
         self.names().into_iter().collect()
     }
 
-    /// Takes an image.
+    /// Handles an image.
     pub fn on_image(&mut self, stream: Stream, image: Arc<Image>) -> Vec<CloudOutput> {
         let (count, content) = match stream {
             Stream::Depth => (&mut self.counts.depth_in, Content::Depth),
@@ -118,7 +118,7 @@ impl SemanticCloud {
         self.serve(false)
     }
 
-    /// Takes a depth image as compressed_depth_image_transport packs it.
+    /// Handles a depth image of compressed_depth_image_transport.
     pub fn on_compressed_depth(&mut self, message: &CompressedImage) -> Vec<CloudOutput> {
         match compressed::depth_image(message, self.options.max_image_pixels) {
             Ok(image) => self.on_image(Stream::Depth, Arc::new(image)),
@@ -130,7 +130,7 @@ impl SemanticCloud {
         }
     }
 
-    /// Takes an image of colours that is packed as JPEG.
+    /// Handles a JPEG colour image.
     pub fn on_compressed_color(&mut self, message: &CompressedImage) -> Vec<CloudOutput> {
         match segmenter::unpacked(message, self.options.max_image_pixels) {
             Ok(image) => self.on_image(Stream::Color, Arc::new(image)),
@@ -142,7 +142,7 @@ impl SemanticCloud {
         }
     }
 
-    /// Hears that a network begins with the image of a stamp: its depth image is kept until it has labels.
+    /// Notes that a network has begun an image: the depth image of its stamp is kept until the labels arrive.
     pub fn on_begun(&mut self, stamp_ns: i64) -> Vec<CloudOutput> {
         for (stream, reason) in self.waiting.hold(stamp_ns) {
             self.drop_image(stream, reason);
@@ -150,7 +150,7 @@ impl SemanticCloud {
         self.serve(false)
     }
 
-    /// Takes labels that a network has made, with what came with them.
+    /// Handles labels of the built-in network, with companion images.
     pub fn on_labelled(&mut self, labels: LabelSet) -> Vec<CloudOutput> {
         self.counts.labels_in += 1;
         if labels.reader(1, self.options.max_image_pixels).is_none() {
@@ -164,7 +164,7 @@ impl SemanticCloud {
         self.serve(false)
     }
 
-    /// Takes the calibration of the camera. One that cannot be used leaves the node without.
+    /// Handles the camera calibration. An invalid one removes the previous one.
     pub fn on_camera_info(&mut self, info: Arc<CameraInfo>) -> Vec<CloudOutput> {
         let is_known = self.info.as_ref().is_some_and(|old| {
             let header = info.header.clone();
@@ -198,14 +198,14 @@ impl SemanticCloud {
         self.serve(false)
     }
 
-    /// Takes the names of the classes.
+    /// Handles the class names.
     pub fn on_label_info(&mut self, info: Arc<LabelInfo>) -> Vec<CloudOutput> {
         self.classes.set_threshold(info.threshold);
         self.label_info = Some(info);
         self.names().into_iter().collect()
     }
 
-    /// Ends the input: what belongs together comes out, the rest is counted.
+    /// Ends the input: matching images are processed, the rest is counted.
     pub fn finish(&mut self) -> Vec<CloudOutput> {
         let outputs = self.serve(true);
         for (stream, reason) in self.waiting.clear(Left::NoPartner) {
@@ -219,22 +219,22 @@ impl SemanticCloud {
         &self.counts
     }
 
-    /// Images that wait for others.
+    /// Number of queued images.
     pub fn waiting(&self) -> usize {
         self.waiting.len()
     }
 
-    /// True if there is a camera to make points with.
+    /// True with a valid camera calibration.
     pub fn has_camera(&self) -> bool {
         self.camera.is_some()
     }
 
-    /// The last refusal in words.
+    /// Text of the last rejection.
     pub fn problem(&self) -> Option<&str> {
         self.problem.as_deref()
     }
 
-    /// Clouds of all images that belong together by now.
+    /// Clouds of all images with a match.
     fn serve(&mut self, is_end: bool) -> Vec<CloudOutput> {
         let mut outputs = Vec::new();
         while self.camera.is_some()
@@ -268,7 +268,7 @@ impl SemanticCloud {
             self.rays = camera.rays();
         }
         let Some(pixels) = set.labels.reader(depth.width, max) else {
-            // The limit may be lower than when they came.
+            // The limit may have been reduced since they arrived.
             let problem = "larger than `max_image_pixels`";
             self.refuse(Stream::Labels.name(), "too_large", problem);
             return None;
@@ -304,6 +304,6 @@ impl SemanticCloud {
     fn refuse(&mut self, topic: &str, reason: &str, problem: &str) {
         self.counts.drop_one(topic, reason);
         self.problem = Some(format!("{topic}: {problem}"));
-        log::debug!("{topic} refused: {problem}");
+        log::debug!("{topic} rejected: {problem}");
     }
 }

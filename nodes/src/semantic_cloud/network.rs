@@ -1,4 +1,4 @@
-//! Diagnostics and messages of the network inside of the node.
+//! Diagnostics and outputs of the built-in network.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::start::NodeError;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Node, Publisher};
 
-/// Publishers of labels that the node makes itself.
+/// Publishers of the node's own labels.
 pub(super) struct Outputs {
     /// State of the network.
     pub view: NetworkView,
@@ -21,7 +21,7 @@ pub(super) struct Outputs {
 }
 
 impl Outputs {
-    /// Publishers of the topics that a `segmenter` has.
+    /// Creates the publishers of a `segmenter`.
     pub fn new(node: &Node, view: NetworkView) -> Result<Self, NodeError> {
         Ok(Self {
             view,
@@ -41,8 +41,8 @@ impl Outputs {
         }
     }
 
-    /// Publishes the names of the classes, and gives them; none if nobody names them.
-    pub fn tell_names(&self) -> Option<Arc<LabelInfo>> {
+    /// Publishes and returns the class names; `None` if there are none.
+    pub fn publish_names(&self) -> Option<Arc<LabelInfo>> {
         let info = Arc::new(self.view.label_info()?);
         if let Err(error) = self.label_info.publish(Arc::clone(&info)) {
             log::debug!("not published: {error}");

@@ -1,4 +1,4 @@
-//! The machine as a ROS node: a thin shell around [`SemanticCloud`].
+//! ROS node around [`SemanticCloud`].
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -17,22 +17,24 @@ use crate::segmenter::{self, LoadedNetwork, NetworkEvent, Worker};
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Losses, Node, Publisher, Runtime, Subscription};
+use lattice_runtime::{
+    Diagnostics, Level, Losses, Node, Publisher, Runtime, Subscription, SubscriptionExecutor,
+};
 
-/// Most depth images whose arrival is remembered.
+/// Limit of stored arrival times of depth images.
 const MAX_ARRIVALS: usize = 256;
-/// Images of colours.
+/// Topic of colour images.
 const COLOR: &str = "rgb/image_rect_color";
 
 /// Event for the compute thread.
 enum Event {
-    /// An image, and when it came.
+    /// An image with its arrival time.
     Image(Stream, Arc<Image>, Instant),
     CompressedDepth(Arc<CompressedImage>, Instant),
     CompressedColor(Arc<CompressedImage>),
     CameraInfo(Arc<CameraInfo>),
     LabelInfo(Arc<LabelInfo>),
-    /// Of the network inside of the node.
+    /// Event of the built-in network.
     Network(NetworkEvent),
     Diagnose,
     Settings(Box<CloudOptions>),
@@ -55,7 +57,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         None => None,
     };
     let view = ready.as_ref().map(LoadedNetwork::view);
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         machine: SemanticCloud::new(settings.cloud.clone()),
         points: node.publisher("points", Qos::SCANS)?,
         label_info: node.publisher("label_info", Qos::LATCHED)?,
@@ -69,10 +71,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         warned: 0,
         report_file: settings.report_file.clone(),
     };
-    shell.tell_names();
+    compute_state.publish_names();
     let shutdown = runtime.shutdown_handle();
     let compute = Compute::spawn(name, settings.limits, shutdown.clone(), move |event| {
-        shell.on(event)
+        compute_state.on(event)
     })?;
     let inbox = compute.inbox();
     let mut inputs = subscribe(&node, &inbox, &lost, &settings)?;
@@ -129,55 +131,85 @@ fn subscribe(
         let event = |image| Event::CompressedDepth(image, Instant::now());
         let depth = inbox.counting(lost, event, packed);
         let topic = format!("{topic}/compressedDepth");
-        node.subscribe(&topic, Qos::SENSOR, Load::Large, depth)?
+        node.subscribe(&topic, Qos::SENSOR, SubscriptionExecutor::Dedicated, depth)?
     } else {
-        node.subscribe(topic, Qos::SENSOR, Load::Large, images(Stream::Depth))?
+        node.subscribe(
+            topic,
+            Qos::SENSOR,
+            SubscriptionExecutor::Dedicated,
+            images(Stream::Depth),
+        )?
     }];
     if settings.network.is_none() {
         let labels = images(Stream::Labels);
-        inputs.push(node.subscribe("labels/image", Qos::SENSOR, Load::Large, labels)?);
+        inputs.push(node.subscribe(
+            "labels/image",
+            Qos::SENSOR,
+            SubscriptionExecutor::Dedicated,
+            labels,
+        )?);
         let names = inbox.counting(lost, Event::LabelInfo, |_| 0);
-        inputs.push(node.subscribe("labels/label_info", Qos::LATCHED, Load::Small, names)?);
+        inputs.push(node.subscribe(
+            "labels/label_info",
+            Qos::LATCHED,
+            SubscriptionExecutor::Shared,
+            names,
+        )?);
     }
     if settings.cloud.pair.with_confidence {
         let confidence = images(Stream::Confidence);
-        inputs.push(node.subscribe("labels/confidence", Qos::SENSOR, Load::Large, confidence)?);
+        inputs.push(node.subscribe(
+            "labels/confidence",
+            Qos::SENSOR,
+            SubscriptionExecutor::Dedicated,
+            confidence,
+        )?);
     }
     if settings.cloud.pair.with_color {
         inputs.push(if settings.compressed_color {
             let color = inbox.counting(lost, Event::CompressedColor, packed);
             let topic = format!("{COLOR}/compressed");
-            node.subscribe(&topic, Qos::SENSOR, Load::Large, color)?
+            node.subscribe(&topic, Qos::SENSOR, SubscriptionExecutor::Dedicated, color)?
         } else {
-            node.subscribe(COLOR, Qos::SENSOR, Load::Large, images(Stream::Color))?
+            node.subscribe(
+                COLOR,
+                Qos::SENSOR,
+                SubscriptionExecutor::Dedicated,
+                images(Stream::Color),
+            )?
         });
     }
     let camera = inbox.counting(lost, Event::CameraInfo, |_| 0);
-    inputs.push(node.subscribe("rgb/camera_info", Qos::SENSOR, Load::Small, camera)?);
+    inputs.push(node.subscribe(
+        "rgb/camera_info",
+        Qos::SENSOR,
+        SubscriptionExecutor::Shared,
+        camera,
+    )?);
     Ok(inputs)
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     machine: SemanticCloud,
     points: Publisher<PointCloud2>,
     label_info: Publisher<LabelInfo>,
     network: Option<Outputs>,
     diagnostics: Diagnostics,
-    /// Messages that found the inbox full, and those lost before it.
+    /// Messages rejected by the inbox or lost before it.
     lost: Arc<AtomicU64>,
     losses: Losses,
-    /// Stamps of depth images, and when they came.
+    /// Stamps of depth images with their arrival times.
     arrivals: VecDeque<(i64, Instant)>,
-    /// From the arrival of a depth image to its cloud, seconds.
+    /// Latency from a depth image to its cloud, seconds.
     last_latency_s: f64,
     warnings: Throttle,
-    /// Messages dropped when there was a warning last.
+    /// Dropped messages at the last warning.
     warned: u64,
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         let outputs = match event {
             Event::Image(stream, image, at) => {
@@ -199,7 +231,7 @@ impl Shell {
                 self.machine.on_labelled(labels)
             }
             Event::Network(NetworkEvent::Names) => {
-                self.tell_names();
+                self.publish_names();
                 return;
             }
             Event::CameraInfo(info) => self.machine.on_camera_info(info),
@@ -226,9 +258,9 @@ impl Shell {
         }
     }
 
-    /// Names of the classes of the network inside of the node.
-    fn tell_names(&mut self) {
-        let info = self.network.as_ref().and_then(Outputs::tell_names);
+    /// Publishes the class names of the built-in network.
+    fn publish_names(&mut self) {
+        let info = self.network.as_ref().and_then(Outputs::publish_names);
         if let Some(info) = info {
             let outputs = self.machine.on_label_info(info);
             self.publish(outputs);
@@ -274,7 +306,7 @@ impl Shell {
         let dropped: u64 = counts.dropped.values().sum();
         let problem = self.machine.problem().map(str::to_owned);
         let message = match (self.machine.has_camera(), dropped) {
-            (false, _) => "no camera_info yet that can be used".to_owned(),
+            (false, _) => "no valid camera_info yet".to_owned(),
             (true, 0) if counts.clouds_out == 0 => "no cloud yet".to_owned(),
             (true, 0) => "making clouds".to_owned(),
             (true, _) => {
@@ -292,7 +324,7 @@ impl Shell {
             && self.warnings.check().is_some()
         {
             self.warned = dropped;
-            log::warn!("{message}; last refused: {problem}");
+            log::warn!("{message}; last rejection: {problem}");
         }
         let mut values = report::key_values(&report);
         values.push(("images_waiting".into(), self.machine.waiting().to_string()));

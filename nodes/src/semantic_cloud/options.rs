@@ -5,21 +5,21 @@ use super::waiting::PairOptions;
 use crate::camera::ClassRules;
 use lattice_runtime::params::{ParamError, Params};
 
-/// Most images of a topic that a parameter may let wait.
+/// Largest settable queue of images per topic.
 const MAX_QUEUE: usize = 1000;
 
 /// Options of a [`super::SemanticCloud`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct CloudOptions {
-    /// Rules by which images belong together.
+    /// Matching rules of images.
     pub pair: PairOptions,
-    /// Images of more pixels are refused.
+    /// Larger images are rejected, pixels.
     pub max_image_pixels: usize,
-    /// True if the images are rectified: `p` of the camera holds, and its distortion does not.
+    /// True for rectified images: `p` of the camera is used, without distortion.
     pub rectified: bool,
-    /// Choice of the pixels that become points.
+    /// Selection of the pixels that become points.
     pub points: PointOptions,
-    /// Meaning of the classes.
+    /// Mapping of the classes.
     pub classes: ClassRules,
 }
 

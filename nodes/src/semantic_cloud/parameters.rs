@@ -1,4 +1,4 @@
-//! All parameters of the node.
+//! Parameters of the node.
 
 use super::CloudOptions;
 use crate::compute::ComputeLimits;
@@ -8,26 +8,26 @@ use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
-    "queue_size": "Images of each topic that wait for those of their time; the oldest goes and is counted.";
+    "queue_size": "Images of each topic queued for those of the same stamp; the oldest is dropped and counted.";
     "exact_sync": "Whether the stamps of depth and labels must be equal.";
-    "max_stamp_difference_s": "Otherwise, the largest difference between them.";
+    "max_stamp_difference_s": "Largest difference between the stamps of depth and labels without exact_sync.";
     "use_confidence" fixed(options::TOPIC): "Whether labels wait for labels/confidence of their stamp.";
-    "use_color" fixed(options::TOPIC): "Whether points have the colours of rgb/image_rect_color, for which labels wait until it has come with their stamp; with model they always have.";
+    "use_color" fixed(options::TOPIC): "Whether points have the colours of rgb/image_rect_color, for which labels wait by stamp; always with model.";
     "compressed_depth" fixed(options::TOPIC): "Whether depth is taken from depth_registered/image_rect/compressedDepth (PNG).";
-    "rectified": "Whether the images are rectified: then p of camera_info holds, otherwise k and the distortion.";
-    "max_image_pixels": "Images of more pixels are refused.";
-    "stride": "Only every so many rows and columns become points.";
-    "min_range_m": "Points nearer to the sensor are left out.";
-    "max_range_m": "Points farther from the sensor are left out; 0: no limit.";
-    "edge_jump": "Pixels are left out whose depth and that of one of the eight around differ by more than this fraction: labels bleed there; 0: none.";
-    "threads" fixed("the pool is made with it"): "Threads of the network; 0: one less than the machine has.";
-    "group_labels": "Classes that count as others: class, group, class, group and so on.";
+    "rectified": "Whether the images are rectified: p of camera_info is used, otherwise k and the distortion.";
+    "max_image_pixels": "Limit of pixels per image; larger images are rejected.";
+    "stride": "Step between the rows and columns that become points.";
+    "min_range_m": "Points nearer to the sensor are rejected.";
+    "max_range_m": "Points farther from the sensor are rejected; 0: no limit.";
+    "edge_jump": "Largest depth difference to the eight adjacent pixels, as a fraction: pixels beyond it are rejected, since labels bleed at edges; 0: none.";
+    "threads" fixed("the pool is made with it"): "Threads of the network; 0: one less than the number of cores.";
+    "group_labels": "Groups of classes: class, group, class, group and so on.";
 };
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub cloud: CloudOptions,
-    /// Network inside of the node, with its options.
+    /// Built-in network with its options.
     pub network: Option<(NetworkSettings, SegmenterOptions)>,
     pub compressed_color: bool,
     pub compressed_depth: bool,
@@ -51,7 +51,7 @@ impl Settings {
         let of_network = SegmenterOptions::of_network(params, cloud.max_image_pixels, with_soft)?;
         let network = NetworkSettings::from_params(params)?;
         if network.is_some() {
-            // They come with the labels.
+            // They are delivered with the labels.
             (cloud.pair.with_confidence, cloud.pair.with_color) = (false, false);
         }
         let compressed_color = params.bool("compressed_color", false)?;
@@ -74,7 +74,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

@@ -1,33 +1,33 @@
-//! Depth and labels to points.
+//! Projection of depth and labels to points.
 
 use super::counts::PointCounts;
 use crate::camera::{Classes, ImageView, LabelledPoints, PixelReader};
 
-/// Choice of the pixels that become points.
+/// Selection of the pixels that become points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointOptions {
-    /// Every so many columns and rows.
+    /// Step between columns and between rows.
     pub stride: usize,
-    /// Points nearer to the camera are left out, m.
+    /// Nearer points are rejected, m.
     pub min_range_m: f64,
-    /// Points farther from the camera are left out, m.
+    /// Farther points are rejected, m.
     pub max_range_m: f64,
-    /// Largest difference to the depths of the eight pixels around, as a fraction of the smaller; infinite: any.
+    /// Largest relative depth difference to the eight adjacent pixels, as a fraction of the smaller depth; infinite: any.
     pub edge_jump: f32,
 }
 
-/// Images of one time with the rays of the depth image's pixels.
+/// Images of one stamp with the rays of the depth image.
 pub struct Views<'a> {
     /// Depth.
     pub depth: ImageView<'a>,
-    /// Labels and what came with them, read at the pixels of the depth image.
+    /// Labels and companion images, sampled at the pixels of the depth image.
     pub pixels: PixelReader<'a>,
-    /// x / z and y / z of each pixel of the depth image; NaN: none.
+    /// x / z and y / z of each pixel of the depth image; NaN: no ray.
     pub rays: &'a [[f32; 2]],
 }
 
 impl Views<'_> {
-    /// The points, row by row.
+    /// Points, row by row.
     pub fn points(
         &mut self,
         options: &PointOptions,
@@ -79,7 +79,7 @@ impl Views<'_> {
     }
 }
 
-/// Pixels whose depth differs much from that of one of the eight around; those without depth say nothing.
+/// Depth edges: pixels that differ from one of the eight adjacent ones; missing depths are ignored.
 struct Edges {
     width: usize,
     is_edge: Vec<bool>,
@@ -93,7 +93,7 @@ impl Edges {
                 is_edge: Vec::new(),
             };
         }
-        // Nearest and farthest in a row and then of three rows; min and max pass over NaN.
+        // Nearest and farthest in a row and then of three rows; min and max ignore NaN.
         let near = around(depths_m, width, f32::min);
         let far = around(depths_m, width, f32::max);
         let bounds = depths_m.iter().zip(near.iter().zip(&far));
@@ -112,7 +112,7 @@ impl Edges {
     }
 }
 
-/// The best of each pixel and the eight around it.
+/// Best value of each pixel and its eight adjacent ones.
 fn around(values: &[f32], width: usize, best: impl Fn(f32, f32) -> f32 + Copy) -> Vec<f32> {
     let mut in_rows = values.to_vec();
     for (row, out) in values.chunks(width).zip(in_rows.chunks_mut(width)) {
@@ -123,14 +123,14 @@ fn around(values: &[f32], width: usize, best: impl Fn(f32, f32) -> f32 + Copy) -
     out
 }
 
-/// Folds into each value those `distance` before and behind it.
+/// Folds into each value those at `distance` before and after it.
 fn fold_neighbours(
     values: &[f32],
     out: &mut [f32],
     distance: usize,
     best: impl Fn(f32, f32) -> f32 + Copy,
 ) {
-    // Slices, whose loops have one number and so many lanes.
+    // Slices with one common length vectorise.
     for (out, before) in out
         .get_mut(distance..)
         .unwrap_or_default()

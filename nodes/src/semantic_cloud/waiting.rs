@@ -1,4 +1,4 @@
-//! Images that wait for those of the same time.
+//! Queue of images that wait for those of the same stamp.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -7,27 +7,27 @@ use lattice_msgs::sensor_msgs::Image;
 
 use crate::camera::LabelSet;
 
-/// A step back of a stream's stamps by more than this is a log that loops.
+/// Backward step of a stream's stamps that counts as a looping log.
 const JUMP_BACK_NS: i64 = 1_000_000_000;
 
-/// A topic of images.
+/// Image topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stream {
-    /// Depth images, whose stamps the clouds have.
+    /// Depth images, whose stamps are those of the clouds.
     Depth,
-    /// Label images, of the stamp nearest to a depth image's.
+    /// Label images, matched to the nearest depth stamp.
     Labels,
-    /// Confidences, of exactly the stamp of a label image.
+    /// Confidence images, matched by the stamp of a label image.
     Confidence,
-    /// Images of colours, of exactly the stamp of a label image.
+    /// Colour images, matched by the stamp of a label image.
     Color,
 }
 
 impl Stream {
-    /// All, in the order of their numbers.
+    /// All topics, in the order of their numbers.
     pub const ALL: [Self; 4] = [Self::Depth, Self::Labels, Self::Confidence, Self::Color];
 
-    /// Name under which it is counted.
+    /// Counter name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Depth => "depth",
@@ -38,12 +38,12 @@ impl Stream {
     }
 }
 
-/// Rules by which images belong together.
+/// Matching rules of images.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PairOptions {
-    /// Most images of a topic that wait; the oldest goes.
+    /// Queue length per topic; the oldest image is dropped.
     pub queue_size: usize,
-    /// Largest difference between the stamps of depth and labels; 0: they must be equal.
+    /// Largest difference between depth and label stamps; 0: they must be equal.
     pub max_difference_ns: u64,
     /// True if labels come with confidences.
     pub with_confidence: bool,
@@ -51,41 +51,41 @@ pub struct PairOptions {
     pub with_color: bool,
 }
 
-/// Images of one time.
+/// Matched images.
 #[derive(Debug)]
 pub struct Set {
     /// Depth image.
     pub depth: Arc<Image>,
-    /// Label image with what is asked for beside it.
+    /// Label image with its companion images.
     pub labels: LabelSet,
 }
 
-/// Reason for which an image left without its partner.
+/// Reason for dropping an image without a match.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Left {
-    /// Others of its topic needed its place.
+    /// The queue was full.
     NoPartner,
-    /// There was one of its stamp.
+    /// Duplicate stamp.
     Repeated,
-    /// It waited when the stamps jumped back.
+    /// Queued when the stamps jumped back.
     TimeJump,
 }
 
-/// Images of each topic by stamp, at most `queue_size` of each.
+/// Images of each topic by stamp, at most `queue_size` each.
 ///
-/// Depth and labels belong together if each is the nearest to the other; unless their stamps are equal
-/// this is known once each topic has come to the stamp of the other. Every image is used once.
+/// Depth and labels match if each is the nearest to the other. Unless their stamps are equal,
+/// this is decided once each topic has reached the stamp of the other. Every image is used once.
 #[derive(Debug)]
 pub struct Waiting {
     options: PairOptions,
     queues: [BTreeMap<i64, LabelSet>; 4],
     newest_ns: [Option<i64>; 4],
-    /// Stamp of the image that a network labels: the depth image that is nearest does not go.
+    /// Stamp of the image in the network: the nearest depth image is kept.
     held_ns: Option<i64>,
 }
 
 impl Waiting {
-    /// No images.
+    /// Empty queue.
     pub fn new(options: PairOptions) -> Self {
         Self {
             options,
@@ -95,15 +95,15 @@ impl Waiting {
         }
     }
 
-    /// Hears that labels of a stamp are being made: the depth image of that time waits for them, however many
-    /// come meanwhile, and no labels of earlier stamps will come.
+    /// Notes that labels of a stamp are being computed: the depth image of that stamp is kept regardless of the queue
+    /// length, and no earlier labels will arrive.
     pub fn hold(&mut self, stamp_ns: i64) -> Vec<(Stream, Left)> {
         let left = self.come_to(Stream::Labels, stamp_ns);
         self.held_ns = Some(stamp_ns);
         left
     }
 
-    /// Notes the stamp of what comes; where it lies far behind, all that waits leaves.
+    /// Handles the stamp of an image; a large backward step drops all queued images.
     fn come_to(&mut self, stream: Stream, stamp_ns: i64) -> Vec<(Stream, Left)> {
         let mut left = Vec::new();
         let newest_ns = self.newest_ns[stream as usize].unwrap_or(stamp_ns);
@@ -116,17 +116,17 @@ impl Waiting {
         left
     }
 
-    /// Goes on by other rules.
+    /// Changes the rules.
     pub fn set_options(&mut self, options: PairOptions) {
         self.options = options;
     }
 
-    /// Adds an image, and tells of those that leave for it.
+    /// Adds an image; returns the images dropped for it.
     pub fn push(&mut self, stream: Stream, image: Arc<Image>) -> Vec<(Stream, Left)> {
         self.push_set(stream, LabelSet::new(image))
     }
 
-    /// Adds labels with what came with them.
+    /// Adds labels with companion images.
     pub fn push_labels(&mut self, labels: LabelSet) -> Vec<(Stream, Left)> {
         self.push_set(Stream::Labels, labels)
     }
@@ -149,8 +149,8 @@ impl Waiting {
         left
     }
 
-    /// Takes the oldest images that belong together; at the end of the input (`is_end`) no others are
-    /// waited for.
+    /// Removes the oldest matched images; at the end of the input (`is_end`) no further ones
+    /// are expected.
     pub fn take(&mut self, is_end: bool) -> Option<Set> {
         let depths = self.queues[Stream::Depth as usize].keys();
         let found =
@@ -169,7 +169,7 @@ impl Waiting {
         Some(Set { depth, labels })
     }
 
-    /// Stamp of the labels that belong to a depth image, once that is sure.
+    /// Stamp of the labels matched to a depth image, once decided.
     fn labels_of(&self, depth_ns: i64, is_end: bool) -> Option<i64> {
         let [depths, labels, confidences, colors] = &self.queues;
         let labels_ns = nearest(labels, depth_ns)?;
@@ -186,7 +186,7 @@ impl Waiting {
         belong.then_some(labels_ns)
     }
 
-    /// Forgets all images, and tells of them.
+    /// Drops and returns all images.
     pub fn clear(&mut self, reason: Left) -> Vec<(Stream, Left)> {
         let mut left = Vec::new();
         for stream in Stream::ALL {
@@ -196,13 +196,13 @@ impl Waiting {
         left
     }
 
-    /// Images that wait.
+    /// Number of queued images.
     pub fn len(&self) -> usize {
         self.queues.iter().map(BTreeMap::len).sum()
     }
 }
 
-/// The stamp in a queue that is nearest, of two the older.
+/// Nearest stamp in a queue, the older of two.
 fn nearest<T>(queue: &BTreeMap<i64, T>, stamp_ns: i64) -> Option<i64> {
     let before = queue.range(..=stamp_ns).next_back();
     let after = queue.range(stamp_ns..).next();

@@ -7,66 +7,66 @@ use serde::{Deserialize, Serialize};
 pub struct ServerCounts {
     /// Clouds received.
     pub clouds_in: u64,
-    /// Clouds refused: not in the headset's frame.
+    /// Clouds rejected: not in the headset's frame.
     pub clouds_wrong_frame: u64,
-    /// Clouds refused: without points.
+    /// Clouds rejected: without points.
     pub clouds_empty: u64,
-    /// Clouds refused: no point is finite and near enough.
+    /// Clouds rejected: no point is finite and within range.
     pub clouds_no_place: u64,
-    /// Clouds refused: without labels, where those are required.
+    /// Clouds rejected: without labels, where those are required.
     pub clouds_unlabelled: u64,
-    /// Clouds refused: more points than `max_cloud_points`.
+    /// Clouds rejected: more points than `max_cloud_points`.
     pub clouds_too_large: u64,
-    /// Clouds refused: the bytes are not what the header says.
+    /// Clouds rejected: the data do not match the header.
     pub clouds_malformed: u64,
-    /// Clouds that came before the map.
+    /// Clouds received before the map.
     pub clouds_no_map: u64,
-    /// Clouds with which a search began.
+    /// Clouds that started a search.
     pub clouds_searched: u64,
-    /// Clouds that the known pose was refined by.
+    /// Clouds used for tracking the current pose.
     pub clouds_tracked: u64,
     /// Clouds kept for the next search.
     pub clouds_kept: u64,
-    /// Points left out: NaN or infinite.
+    /// Points rejected: NaN or infinite.
     pub points_not_finite: u64,
-    /// Points left out: farther than `max_range_m`.
+    /// Points rejected: farther than `max_range_m`.
     pub points_too_far: u64,
-    /// Sessions begun.
+    /// Headset sessions.
     pub sessions: u64,
     /// Requests received.
     pub requests_in: u64,
-    /// Requests refused: another is at work.
+    /// Requests rejected: another one is in progress.
     pub requests_busy: u64,
-    /// Requests refused: no map, no cloud, another session or no pose as a guess.
+    /// Requests rejected: no map, no cloud, another session or an invalid guess.
     pub requests_refused: u64,
-    /// Searches ended: the headset was found.
+    /// Searches with verdict `OK`.
     pub searches_ok: u64,
-    /// Searches ended: several places fit.
+    /// Searches with verdict `AMBIGUOUS`.
     pub searches_ambiguous: u64,
-    /// Searches ended: a direction is open.
+    /// Searches with verdict `DEGENERATE`.
     pub searches_degenerate: u64,
-    /// Searches ended: nothing fits.
+    /// Searches with verdict `NO_OVERLAP`.
     pub searches_no_overlap: u64,
-    /// Searches ended: the clouds or the map cannot be used, mirrored ones among them.
+    /// Searches with verdict `REJECTED_INPUT`: unusable clouds or map, or mirrored clouds.
     pub searches_rejected: u64,
-    /// Searches ended early: canceled, superseded, or of a session that has ended.
+    /// Searches ended early: canceled, superseded, or of an ended session.
     pub searches_ended_early: u64,
-    /// Clouds that did not fit the known pose.
+    /// Clouds that did not fit the current pose.
     pub tracking_misses: u64,
-    /// Clouds that fitted the known pose less than they should.
+    /// Clouds whose fit to the current pose was below `doubt_below`.
     pub tracking_doubts: u64,
-    /// Searches with more looks than the known pose was found with.
+    /// Searches with more scans than the current pose was found with.
     pub confirmations: u64,
-    /// Of these those that fitted best elsewhere: what was known is not known any more.
+    /// Confirmations that fitted best elsewhere, which withdrew the current pose.
     pub poses_withdrawn: u64,
-    /// Times that the known pose was given up.
+    /// Losses of the current pose.
     pub tracking_lost: u64,
-    /// Parts of the map refused.
+    /// Map messages rejected.
     pub map_refused: u64,
 }
 
 impl ServerCounts {
-    /// Clouds refused for any reason.
+    /// Clouds rejected for any reason.
     pub fn clouds_refused(&self) -> u64 {
         self.clouds_wrong_frame
             + self.clouds_empty
@@ -77,19 +77,19 @@ impl ServerCounts {
     }
 }
 
-/// The end of a server.
+/// Report of a server.
 #[derive(Clone, Debug, Serialize)]
 pub struct ServerReport<'a> {
-    /// Everything counted by the state machine.
+    /// Counters of the state machine.
     pub counts: &'a ServerCounts,
-    /// Messages that found the inbox, or the queue before it, full.
+    /// Messages rejected by a full inbox or overrun before it.
     pub inbox_full: u64,
-    /// Messages that were sent and did not come.
+    /// Messages lost on the network.
     pub lost_on_network: u64,
-    /// Samples that did not decode.
+    /// Undecodable samples.
     pub undecodable: u64,
-    /// Voxels of the map that it followed.
+    /// Voxels of the followed map.
     pub map_voxels: usize,
-    /// Times that the map was found to be another than its mapper's.
+    /// Number of detected differences from the mapper's map.
     pub map_differences: u64,
 }

@@ -1,11 +1,11 @@
-//! State of a server on `/diagnostics`.
+//! Diagnostic status of a server.
 
 use lattice_runtime::Level;
 
 use super::{SemanticIcpServer, ServerReport};
 use crate::report;
 
-/// Level, text and figures.
+/// Level, text and values.
 pub(super) fn diagnosis(
     machine: &SemanticIcpServer,
     report: &ServerReport<'_>,

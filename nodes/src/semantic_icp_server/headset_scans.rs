@@ -1,11 +1,11 @@
-//! The clouds of one session that a search may use.
+//! Clouds of one session for the next search.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use lattice_core::registration::SourceCloud;
 
-/// A bounded number of clouds, the newest last.
+/// Bounded list of clouds, the newest last.
 pub(super) struct HeadsetScans {
     kept: VecDeque<Kept>,
     max: usize,
@@ -14,7 +14,7 @@ pub(super) struct HeadsetScans {
 
 struct Kept {
     headset_scan: Arc<SourceCloud>,
-    /// Time of the first of the clouds that this one stands for.
+    /// Time of the first cloud that this one replaced.
     since_ns: i64,
     stamp_ns: i64,
 }
@@ -28,7 +28,7 @@ impl HeadsetScans {
         }
     }
 
-    /// Keeps so many from now on.
+    /// Changes the bounds.
     pub fn set_bounds(&mut self, max: usize, period_ns: i64) {
         (self.max, self.period_ns) = (max.max(1), period_ns);
         while self.kept.len() > self.max {
@@ -36,8 +36,8 @@ impl HeadsetScans {
         }
     }
 
-    /// Adds a cloud; it replaces the newest if that has not been there for the period, and the oldest
-    /// if there are too many. A headset that looks around slowly is seen from several sides.
+    /// Adds a cloud. It replaces the newest one within the period, and the oldest
+    /// one above the limit, so that a slowly turning headset contributes several views.
     pub fn push(&mut self, headset_scan: Arc<SourceCloud>, stamp_ns: i64, now_ns: i64) {
         let mut since_ns = now_ns;
         if let Some(newest) = self.kept.back()
@@ -49,7 +49,7 @@ impl HeadsetScans {
         self.add(headset_scan, stamp_ns, since_ns);
     }
 
-    /// Adds a cloud; the oldest goes if there are too many.
+    /// Adds a cloud; drops the oldest above the limit.
     pub fn add(&mut self, headset_scan: Arc<SourceCloud>, stamp_ns: i64, since_ns: i64) {
         if self.kept.len() >= self.max {
             self.kept.pop_front();
@@ -90,7 +90,7 @@ impl HeadsetScans {
         self.kept.len()
     }
 
-    /// Stamp of the newest; 0 without any.
+    /// Stamp of the newest cloud; 0 without any.
     pub fn stamp_ns(&self) -> i64 {
         self.kept.back().map_or(0, |kept| kept.stamp_ns)
     }

@@ -1,4 +1,4 @@
-//! Clouds of the headset.
+//! Input of headset clouds.
 
 use lattice_core::cloud::CloudError;
 use lattice_msgs::sensor_msgs::PointCloud2;
@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::*;
 use crate::convert::semantic::{SemanticError, headset_scan_from_message};
 
-/// Error of a cloud that cannot be used.
+/// Reason for rejecting a cloud.
 #[derive(Debug, Error)]
 enum Refusal {
     #[error("cloud in frame '{found}', expected '{expected}'")]
@@ -17,7 +17,7 @@ enum Refusal {
 }
 
 impl SemanticIcpServer {
-    /// Takes a cloud of the headset. One that cannot be used is answered by a rejection with the reason.
+    /// Handles a headset cloud. An invalid one is reported as a rejection with the reason.
     pub fn on_headset_cloud(&mut self, message: &PointCloud2, now_ns: i64) -> Vec<Output> {
         let mut out = Vec::new();
         self.counts.clouds_in += 1;

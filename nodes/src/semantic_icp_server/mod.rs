@@ -1,7 +1,7 @@
-//! Calibration of a headset: its labelled clouds are found in the voxels of the robot.
+//! `semantic_icp_server`: registers labelled clouds of a headset with the robot's voxels.
 //!
-//! [`SemanticIcpServer`] is a state machine without I/O and without heavy work: what takes its time is
-//! a [`Job`] for another thread. [`node`] runs both behind DDS.
+//! [`SemanticIcpServer`] is a state machine without I/O and heavy computation: expensive work is
+//! a [`Job`] for another thread. [`node`] connects both to DDS.
 
 mod counts;
 mod diagnosis;
@@ -41,17 +41,17 @@ use crate::convert::calibration::{result_from, set_pose};
 use crate::convert::geometry;
 use crate::map_follower::{FollowError, Followed, MapFollower};
 
-/// Number that the shell gives to a request.
+/// Request number assigned by the node.
 pub type CallId = u64;
 
-/// End of a request.
+/// Outcome of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// The headset was found.
+    /// The headset was localized.
     Found,
-    /// It was not, or the request was refused.
+    /// It was not, or the request was rejected.
     Failed,
-    /// The client did not want it any more.
+    /// The client canceled the request.
     Canceled,
 }
 
@@ -62,17 +62,17 @@ pub enum Output {
     Result(Box<CalibrationResult>),
     /// For `/tf`.
     Transform(TransformStamped),
-    /// To be calculated on another thread; its result goes to [`SemanticIcpServer::on_done`].
+    /// For another thread; its result is passed to [`SemanticIcpServer::on_done`].
     Job(Job),
-    /// The answer to a request.
+    /// Reply to a request.
     Answer(CallId, End, Box<CalibrateResult>),
     /// Progress of a request.
     Feedback(CallId, CalibrateFeedback),
-    /// A part of the map was lost: a keyframe is to be asked for.
+    /// Map messages were lost: request a keyframe.
     NeedKeyframe,
 }
 
-/// Follows a map and a headset, and says where the headset is.
+/// Follows a map and a headset, and estimates the headset's pose.
 pub struct SemanticIcpServer {
     options: ServerOptions,
     follower: MapFollower,
@@ -81,20 +81,20 @@ pub struct SemanticIcpServer {
     /// Class names of the headset.
     names: BTreeMap<u16, String>,
     current: Option<CurrentCalibration>,
-    /// Searches in a row that did not find the headset where it was.
+    /// Consecutive searches that did not confirm the current pose.
     misses: u32,
-    /// Time from which a look that fits somewhat may be doubted again.
+    /// Time until which a poor fit of a scan starts no search.
     doubt_again_ns: i64,
     running: Option<Running>,
     pending: Option<PendingRequest>,
-    /// A cloud came that no search has used.
+    /// True if a cloud has arrived since the last search.
     fresh_cloud: bool,
-    /// The newest cloud that the known pose is still to be refined by, and its stamp.
+    /// Newest cloud for tracking the current pose, and its stamp.
     look: Option<(Arc<SourceCloud>, i64)>,
     next_job: u64,
-    /// Confusions of labels learned so far are of another session, segmenter or map.
-    reset_labels: bool,
-    /// State of the map that the searcher has: epoch, sequence, and when.
+    /// Learned label confusions are of another session, segmenter or map.
+    reset_label_confusion: bool,
+    /// Map state last passed to the search: epoch, sequence, and time.
     prepared: Option<(u64, Option<u64>, i64)>,
     last: CalibrationResult,
     published_ns: i64,
@@ -102,7 +102,7 @@ pub struct SemanticIcpServer {
 }
 
 impl SemanticIcpServer {
-    /// A server that has seen nothing.
+    /// Initial state.
     pub fn new(options: ServerOptions) -> Self {
         Self {
             follower: MapFollower::new(options.max_map_voxels),
@@ -120,7 +120,7 @@ impl SemanticIcpServer {
             fresh_cloud: false,
             look: None,
             next_job: 0,
-            reset_labels: false,
+            reset_label_confusion: false,
             prepared: None,
             last: CalibrationResult::default(),
             published_ns: 0,
@@ -129,13 +129,13 @@ impl SemanticIcpServer {
         }
     }
 
-    /// Takes one chunk of a keyframe of the map.
+    /// Handles one keyframe chunk of the map.
     pub fn on_map(&mut self, message: &LatticeMap, now_ns: i64) -> Vec<Output> {
         let followed = self.follower.on_map(message);
         self.followed(followed, now_ns)
     }
 
-    /// Takes one chunk of an update of the map.
+    /// Handles one update chunk of the map.
     pub fn on_map_update(&mut self, message: &LatticeMapUpdate, now_ns: i64) -> Vec<Output> {
         let followed = self.follower.on_update(message);
         self.followed(followed, now_ns)
@@ -147,27 +147,27 @@ impl SemanticIcpServer {
             Ok(Followed::NeedKeyframe) => out.push(Output::NeedKeyframe),
             Ok(_) => {}
             Err(error) => {
-                log::debug!("part of the map refused: {error}");
+                log::debug!("map message rejected: {error}");
                 self.counts.map_refused += 1;
             }
         }
         let (_, replaced) = self.follower.take_touched();
-        self.reset_labels |= replaced;
+        self.reset_label_confusion |= replaced;
         if replaced && self.prepared.is_some() {
-            // Its frame may be another one.
+            // Its frame may differ.
             self.forget("the map is a new one", now_ns, &mut out);
         }
         out
     }
 
-    /// Asks for a keyframe if nothing more comes of an incomplete one. To be called once a second.
-    pub fn wait_a_second(&mut self) -> Option<Output> {
-        let overdue = self.follower.wait_a_second();
+    /// Requests a keyframe if an incomplete one has timed out. To be called once a second.
+    pub fn check_keyframe_timeout(&mut self) -> Option<Output> {
+        let overdue = self.follower.check_keyframe_timeout();
         overdue.then_some(Output::NeedKeyframe)
     }
 
-    /// Takes the names of the headset's classes. Others are of another segmenter, of whose confusions
-    /// nothing is known.
+    /// Handles the class names of the headset. Other names mean another segmenter, whose label confusions
+    /// are unknown.
     pub fn on_label_info(&mut self, message: &LabelInfo) {
         let classes = message.class_map.iter().take(usize::from(u16::MAX));
         let name = |name: &str| name.chars().take(64).collect();
@@ -176,17 +176,17 @@ impl SemanticIcpServer {
             .collect();
         if self.names != names {
             self.names = names;
-            self.reset_labels = true;
+            self.reset_label_confusion = true;
         }
     }
 
-    /// Takes the session of the headset: another one means another origin, of which nothing is known.
+    /// Handles the headset session: a new session has a new, unknown origin.
     pub fn on_session(&mut self, message: &StringMessage, now_ns: i64) -> Vec<Output> {
         let mut out = Vec::new();
         let session: String = message.data.chars().take(256).collect();
         if session != self.session {
             self.counts.sessions += 1;
-            self.reset_labels = true;
+            self.reset_label_confusion = true;
             self.session = session;
             self.headset_scans.clear();
             self.forget("the headset has begun a new session", now_ns, &mut out);
@@ -194,7 +194,7 @@ impl SemanticIcpServer {
         out
     }
 
-    /// Drops the known pose and ends what is at work.
+    /// Drops the current pose and ends running work.
     fn forget(&mut self, why: &str, now_ns: i64, out: &mut Vec<Output>) {
         self.current = None;
         self.misses = 0;
@@ -209,7 +209,7 @@ impl SemanticIcpServer {
         self.publish(result, now_ns, out);
     }
 
-    /// Takes a request; it is answered at once or when its search has ended.
+    /// Handles a request; it is replied to at once or when its search ends.
     pub fn calibrate(&mut self, call: CallId, goal: &CalibrateGoal, now_ns: i64) -> Vec<Output> {
         let mut out = Vec::new();
         self.counts.requests_in += 1;
@@ -227,17 +227,17 @@ impl SemanticIcpServer {
         if asked || self.pending.is_some() {
             if self.options.when_busy == WhenBusy::Reject {
                 self.counts.requests_busy += 1;
-                let reason = "busy: a calibration that was asked for before is at work";
+                let reason = "busy: an earlier calibration request is in progress";
                 self.answer_failed(caller, reason, &mut out);
                 return out;
             }
             let why = "superseded by another request";
-            let waiting = self.pending.take().and_then(|pending| pending.caller);
-            self.answer_failed(waiting, why, &mut out);
+            let pending = self.pending.take().and_then(|pending| pending.caller);
+            self.answer_failed(pending, why, &mut out);
             self.end_running(why, &mut out);
         } else if let Some(running) = self.running.as_mut().filter(|r| !r.tracking) {
             if start.is_none() && !running.outdated {
-                // It is at work already.
+                // The running search serves the request.
                 running.caller = caller;
                 return out;
             }
@@ -248,7 +248,7 @@ impl SemanticIcpServer {
         out
     }
 
-    /// The start of a request, or why it is refused.
+    /// Start of a requested search, or the reason for its rejection.
     fn start_of(&self, goal: &CalibrateGoal) -> Result<Option<Isometry3<f64>>, String> {
         if !goal.session.is_empty() && goal.session != self.session {
             let asked: String = goal.session.chars().take(64).collect();
@@ -273,7 +273,7 @@ impl SemanticIcpServer {
             .ok_or_else(|| "the guess is not a pose: a number is not finite or too large".into())
     }
 
-    /// A client does not want its request any more.
+    /// Cancels a request.
     pub fn cancel(&mut self, call: CallId) -> Vec<Output> {
         let mut out = Vec::new();
         let mut was_asked = self.pending.take_if(|w| w.caller == Some(call)).is_some();
@@ -291,7 +291,7 @@ impl SemanticIcpServer {
         out
     }
 
-    /// Takes the progress of a job.
+    /// Handles the progress of a job.
     pub fn on_progress(&self, job: u64, stage: Stage, fraction: f64) -> Option<Output> {
         let running = self.running.as_ref().filter(|r| r.job == job)?;
         let call = running.caller?;
@@ -308,7 +308,7 @@ impl SemanticIcpServer {
         Some(Output::Feedback(call, feedback))
     }
 
-    /// Takes the result of a job.
+    /// Handles the result of a job.
     pub fn on_done(&mut self, job: u64, done: Done, now_ns: i64) -> Vec<Output> {
         let mut out = Vec::new();
         let Some(running) = self.running.take_if(|r| r.job == job) else {
@@ -323,18 +323,18 @@ impl SemanticIcpServer {
         out
     }
 
-    /// Publishes the transform again, for those who have come late. To be called now and then.
+    /// Repeats the transform for late joiners. To be called regularly.
     pub fn tick(&mut self, now_ns: i64) -> Option<Output> {
         let current = self.current.as_ref()?;
         Some(Output::Transform(self.transform(current, now_ns)))
     }
 
-    /// Ends everything: whoever waits is answered.
+    /// Ends all requests with a reply.
     pub fn finish(&mut self) -> Vec<Output> {
         let mut out = Vec::new();
         let why = "the server ends";
-        let waiting = self.pending.take().and_then(|pending| pending.caller);
-        self.answer_failed(waiting, why, &mut out);
+        let pending = self.pending.take().and_then(|pending| pending.caller);
+        self.answer_failed(pending, why, &mut out);
         self.end_running(why, &mut out);
         out
     }
@@ -344,7 +344,7 @@ impl SemanticIcpServer {
         &self.counts
     }
 
-    /// `map_from_headset_origin`, while it is known.
+    /// `map_from_headset_origin`, if known.
     pub fn map_from_headset(&self) -> Option<Isometry3<f64>> {
         self.current
             .as_ref()
@@ -356,17 +356,17 @@ impl SemanticIcpServer {
         &self.last
     }
 
-    /// Name of a class of the headset, where it is known.
+    /// Name of a class of the headset, if known.
     pub fn class_name(&self, class: u16) -> Option<&str> {
         self.names.get(&class).map(String::as_str)
     }
 
-    /// Times that the map was found to be another than its mapper's.
+    /// Number of detected differences from the mapper's map.
     pub fn map_differences(&self) -> u64 {
         self.follower.differences()
     }
 
-    /// Voxels of the map that is followed.
+    /// Voxels of the followed map.
     pub fn map_voxels(&self) -> usize {
         self.follower.map().map_or(0, |map| map.voxels().len())
     }
@@ -385,7 +385,7 @@ impl SemanticIcpServer {
     }
 }
 
-/// Farther from the origin than any guess.
+/// Upper bound of a guess's distance from the origin.
 const MAX_GUESS_M: f64 = 1e6;
 
 const NO_MAP: &str = "there is no map yet";

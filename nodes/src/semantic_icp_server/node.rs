@@ -1,4 +1,4 @@
-//! The server as a ROS node: a thin shell around [`SemanticIcpServer`].
+//! ROS node around [`SemanticIcpServer`].
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -23,14 +23,14 @@ use crate::compute::{Compute, Inbox};
 use crate::convert::cloud;
 use crate::report;
 use crate::start::{Finish, NodeError, handed_over, open_params};
+use lattice_runtime::SubscriptionExecutor::{Dedicated, Shared};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Load, Losses, Reply, Runtime,
-    Undecoded, lock,
+    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Losses, Reply, Runtime, Undecoded, lock,
 };
 
-/// Between two messages on diagnostics.
+/// Period of the diagnostic status.
 const DIAGNOSE: Duration = Duration::from_secs(1);
 
 /// Event for the thread of the machine.
@@ -43,7 +43,7 @@ enum Event {
     LabelInfo(Arc<LabelInfo>),
     Request(Box<CalibrateRequest>, Reply<CalibrateResponse>),
     Goal(Box<CalibrateGoal>, GoalHandle<CalibrateAction>),
-    /// A client has canceled, or the searcher has news.
+    /// A client has canceled, or the search thread has events.
     Look,
     Tick,
     Diagnose,
@@ -68,7 +68,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let lost = Arc::new(AtomicU64::new(0));
     let map_lost = Arc::new(AtomicBool::new(false));
     let losses = Losses::default();
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         losses: losses.clone(),
         machine: SemanticIcpServer::new(server),
         search: None,
@@ -84,7 +84,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         report_file,
     };
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
-        shell.on(event)
+        compute_state.on(event)
     })?;
     let inbox = compute.inbox();
     let wake = inbox.clone();
@@ -95,7 +95,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         search,
         move || notify(&wake, Event::Look),
     )?;
-    // The first of all events.
+    // First event of the inbox.
     notify(&inbox, Event::SearchPort(thread.port()));
 
     let (to, missed, part) = (inbox.clone(), Arc::clone(&lost), Arc::clone(&map_lost));
@@ -105,7 +105,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             part.store(true, Ordering::Relaxed);
         }
     };
-    let maps = node.subscribe_undecoded("map", Qos::MAP, Load::Small, on_map)?;
+    let maps = node.subscribe_undecoded("map", Qos::MAP, Shared, on_map)?;
     let (to, missed, part) = (inbox.clone(), Arc::clone(&lost), map_lost);
     let on_update = move |update: Undecoded<LatticeMapUpdate>| {
         let bytes = update.bytes(|update| {
@@ -115,19 +115,19 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             part.store(true, Ordering::Relaxed);
         }
     };
-    let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Load::Small, on_update)?;
+    let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Shared, on_update)?;
     let on_cloud = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
-    let clouds = node.subscribe("headset/points", Qos::SENSOR, Load::Large, on_cloud)?;
+    let clouds = node.subscribe("headset/points", Qos::SENSOR, Dedicated, on_cloud)?;
     let on_session = inbox.counting(&lost, Event::Session, |_| 0);
-    let sessions = node.subscribe("headset/session", Qos::LATCHED, Load::Small, on_session)?;
+    let sessions = node.subscribe("headset/session", Qos::LATCHED, Shared, on_session)?;
     let on_info = inbox.counting(&lost, Event::LabelInfo, |_| 0);
-    let infos = node.subscribe("headset/label_info", Qos::LATCHED, Load::Small, on_info)?;
+    let infos = node.subscribe("headset/label_info", Qos::LATCHED, Shared, on_info)?;
 
     losses.watch([&maps, &updates, &clouds, &sessions, &infos]);
-    // A headset comes when its wearer does.
+    // A headset may join at any time.
     node.expect_publishers([&maps], "lattice_mapper", None, |_| true);
     let to = inbox.clone();
-    // One answer does not wait for another: a busy server says so at once.
+    // Replies are concurrent, so that a busy server can reject at once.
     let service =
         node.service_concurrent::<Calibrate>("~/calibrate", 16, move |request, reply| {
             let busy = reply.clone();
@@ -170,38 +170,38 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// Hands over a message, or counts it as lost and returns false.
+/// Sends a message event; a rejected one is counted as lost and returns false.
 fn hand_over(inbox: &Inbox<Event>, event: Event, bytes: usize, lost: &AtomicU64) -> bool {
     let sent = inbox.send(event, bytes);
     lost.fetch_add(u64::from(!sent), Ordering::Relaxed);
     sent
 }
 
-/// Hands over what comes again with the next tick.
+/// Sends an event that the next tick repeats.
 fn notify(inbox: &Inbox<Event>, event: Event) {
     if !inbox.send(event, 0) {
         log::debug!("the inbox is full");
     }
 }
 
-/// A client that waits.
+/// A waiting client.
 enum Client {
     Service(Reply<CalibrateResponse>),
     Action(GoalHandle<CalibrateAction>, Feedback<CalibrateAction>),
 }
 
-/// State of the machine's thread.
-struct Shell {
+/// State of the compute thread.
+struct ComputeState {
     machine: SemanticIcpServer,
     search: Option<SearchPort>,
     outputs: Outputs,
     diagnostics: Diagnostics,
     clock: Clock,
-    /// Messages that found the inbox full.
+    /// Messages rejected by a full inbox.
     lost: Arc<AtomicU64>,
-    /// Losses before it.
+    /// Losses before the inbox.
     losses: Losses,
-    /// A part of the map is one of them.
+    /// True if map messages are among them.
     map_lost: Arc<AtomicBool>,
     calls: BTreeMap<CallId, Client>,
     next_call: CallId,
@@ -210,7 +210,7 @@ struct Shell {
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         let now_ns = self.clock.now_ns();
         let outputs = match event {
@@ -256,7 +256,7 @@ impl Shell {
             Event::Tick => self.machine.tick(now_ns).into_iter().collect(),
             Event::Diagnose => {
                 self.diagnose();
-                let overdue = self.machine.wait_a_second();
+                let overdue = self.machine.check_keyframe_timeout();
                 let lost = self.map_lost.swap(false, Ordering::Relaxed);
                 overdue
                     .or(lost.then_some(Output::NeedKeyframe))
@@ -283,7 +283,7 @@ impl Shell {
         self.next_call
     }
 
-    /// Takes what the searcher has found, and what clients do not want any more.
+    /// Handles search events and canceled requests.
     fn look(&mut self, now_ns: i64) {
         let search = self.search.as_ref();
         let progress = search.and_then(SearchPort::take_progress);
@@ -327,7 +327,7 @@ impl Shell {
                 }
                 Output::Job(job) => {
                     if !self.search.as_ref().is_some_and(|search| search.begin(job)) {
-                        log::error!("the searching thread takes no job");
+                        log::error!("the search thread accepts no job");
                     }
                 }
                 Output::Answer(call, end, result) => self.answer(call, end, *result),
@@ -340,7 +340,7 @@ impl Shell {
                     if self.requests.check().is_some()
                         && let Err(error) = self.outputs.request.publish(Empty::default())
                     {
-                        log::debug!("keyframe not asked for: {error}");
+                        log::debug!("keyframe not requested: {error}");
                     }
                 }
             }

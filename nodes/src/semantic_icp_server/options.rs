@@ -6,57 +6,57 @@ use crate::convert::semantic::SemanticOptions;
 use crate::options::{frame, one_of};
 use lattice_runtime::params::{ParamError, Params};
 
-/// Occasion on which a whole search begins by itself.
+/// Condition for a search without a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SearchWhen {
-    /// With a cloud, as long as it is not known where the headset is.
+    /// At each cloud while the headset's pose is unknown.
     Lost,
-    /// Only when a client asks.
+    /// Never.
     Asked,
 }
 
-/// Treatment of a request while another one is at work.
+/// Policy for a request while another one is in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WhenBusy {
-    /// It is refused.
+    /// Reject it.
     Reject,
-    /// It takes the place of the other.
+    /// Cancel the earlier one.
     Supersede,
 }
 
-/// Options of calibrations, one for each profile where the clouds tell it; else all alike.
+/// Calibration options per profile, where the profile is detected from the clouds; else equal.
 #[derive(Clone, Copy, Debug)]
 pub struct ByProfile([CalibrationOptions; Profile::ALL.len()]);
 
 /// Options of a [`super::SemanticIcpServer`].
 #[derive(Clone, Debug)]
 pub struct ServerOptions {
-    /// Frame of the map, in which the answer is.
+    /// Frame of the map and of the result.
     pub map_frame: String,
-    /// Frame that clouds must be in.
+    /// Required frame of clouds.
     pub headset_frame: String,
-    /// Options for reading clouds.
+    /// Options for labelled clouds.
     pub semantic: SemanticOptions,
     /// Options of calibrations.
     pub calibration: ByProfile,
-    /// Maps of more voxels are not followed.
+    /// Voxel limit of the followed map.
     pub max_map_voxels: usize,
-    /// Occasion on which a whole search begins by itself.
+    /// Condition for a search without a request.
     pub search: SearchWhen,
-    /// Treatment of a request while another one is at work.
+    /// Policy for a request while another one is in progress.
     pub when_busy: WhenBusy,
-    /// Clouds of one session that are searched with together, at most.
+    /// Limit of clouds of one session per search.
     pub max_headset_scans: usize,
-    /// A cloud replaces the one before unless it is later by this, ns.
+    /// Clouds within this time replace each other, ns.
     pub headset_scan_period_ns: i64,
-    /// True if the pose is refined by each cloud once it is known.
+    /// True to track the current pose with each cloud.
     pub track: bool,
-    /// Searches that must fail in a row before a pose that is tracked is given up.
+    /// Consecutive failed searches before a tracked pose is dropped.
     pub lost_after: u32,
-    /// A look is searched with alone if its share of points on the map is below this share of that of
-    /// the calibration: is it mirrored, or the headset elsewhere?
+    /// Fraction of the calibration's inlier fraction below which a cloud is searched alone: it may be
+    /// mirrored, or the headset may have moved.
     pub doubt_below: f64,
-    /// Age of the state of the map up to which a tracked pose is compared with it, ns.
+    /// Age up to which an outdated map state is used for tracking, ns.
     pub map_refresh_ns: i64,
 }
 
@@ -118,7 +118,7 @@ impl ByProfile {
         if let Some(profile) = one_of(params, "profile", &profiles)? {
             return calibration_from(params, semantic, profile).map(ByProfile::from);
         }
-        // The first that are read are shown as the parameters.
+        // The parameters show those of the first profile.
         let [first, ..] = Profile::ALL;
         let mut options = [calibration_from(params, semantic, first)?; Profile::ALL.len()];
         for (options, profile) in options.iter_mut().zip(Profile::ALL).skip(1) {
@@ -127,7 +127,7 @@ impl ByProfile {
         Ok(ByProfile(options))
     }
 
-    /// The options for clouds.
+    /// Options for clouds.
     pub fn of_clouds(&self, headset_scans: &[SourceCloud]) -> CalibrationOptions {
         let [first, others @ ..] = &self.0;
         match others.iter().all(|other| other.profile == first.profile) {
@@ -136,7 +136,7 @@ impl ByProfile {
         }
     }
 
-    /// The options for clouds of a profile; where none is told by the clouds, those of all.
+    /// Options for a profile; common ones if profiles are not detected.
     pub fn of_profile(&self, profile: Profile) -> CalibrationOptions {
         let [first, ..] = &self.0;
         let options = self.0.iter().find(|options| options.profile == profile);
@@ -181,7 +181,7 @@ fn calibration_from(
     })
 }
 
-/// Zero in the parameters stands for a frame that does not know where down is.
+/// Zero in the parameters stands for an unknown gravity direction.
 fn gravity_sigma_rad(params: &Params, default: f64) -> Result<f64, ParamError> {
     let default = if default.is_finite() { default } else { 0.0 };
     let sigma = params.f64_in("gravity_sigma_rad", default, 0.0..=3.2)?;

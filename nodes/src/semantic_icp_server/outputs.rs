@@ -7,7 +7,7 @@ use lattice_runtime::{Node, Publisher, TfBroadcaster};
 
 use crate::start::NodeError;
 
-/// The topics that the node speaks on.
+/// Publishers of the node.
 pub(super) struct Outputs {
     pub calibration: Publisher<CalibrationResult>,
     pub tf: TfBroadcaster,
@@ -15,7 +15,7 @@ pub(super) struct Outputs {
 }
 
 impl Outputs {
-    /// `mapper` is asked for keyframes.
+    /// `mapper` receives keyframe requests.
     pub(super) fn open(node: &Node, mapper: &str) -> Result<Self, NodeError> {
         Ok(Self {
             calibration: node.publisher("calibration", Qos::latched(1))?,

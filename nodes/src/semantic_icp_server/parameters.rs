@@ -1,4 +1,4 @@
-//! All parameters of the server.
+//! Parameters of the server.
 
 use std::time::Duration;
 
@@ -11,43 +11,43 @@ use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
     "map_frame" fixed(FRAME): "Frame of the map.";
-    "headset_frame" fixed(FRAME): "Frame that the headset's clouds must be in: its origin.";
-    "headset_axes" fixed(FRAME): "Axes of the clouds: ros_flu (forward, left, up), unity_ruf (right, up, forward; left-handed), winrt_rub (right, up, backward) or optical (right, down, forward). Gravity must be along down.";
-    "max_cloud_points": "Clouds of more points are refused.";
-    "max_range_m": "Points farther from the origin of the headset are left out.";
-    "require_labels": "Whether clouds without labels are refused; otherwise they are searched by surfaces alone.";
-    "max_map_voxels": "Maps of more voxels are not followed.";
-    "search": "When a whole search begins by itself: lost (with a cloud, as long as it is not known where the headset is) or asked (only when a client asks).";
-    "when_busy": "A request while another is at work: reject (it is refused) or supersede (it takes its place).";
-    "max_headset_scans": "Clouds of one session that are searched with together.";
-    "headset_scan_period_s": "A cloud replaces the one before unless it is later by this.";
-    "track": "Whether the pose is refined by each cloud once it is known.";
-    "lost_after": "Searches that must fail in a row before a known pose is given up.";
-    "doubt_below": "A cloud is searched with alone if its share of points on the map is below this share of that of the calibration: it may be mirrored, or the headset elsewhere.";
-    "map_refresh_s": "How long clouds are compared with an old state of a map that changes.";
-    "profile" fixed("the defaults of others follow from it"): "Sensor of the clouds: headset, lidar (may lean), depth_camera, or auto for what range, density and noise of each cloud tell; the defaults of the parameters of the search follow from it.";
-    "min_points": "Fewest points of a search.";
-    "registered_points": "About how many points are registered; more are thinned.";
+    "headset_frame" fixed(FRAME): "Required frame of the headset's clouds: its origin.";
+    "headset_axes" fixed(FRAME): "Axis convention of the clouds: ros_flu (forward, left, up), unity_ruf (right, up, forward; left-handed), winrt_rub (right, up, backward) or optical (right, down, forward). Gravity must be along down.";
+    "max_cloud_points": "Limit of points per cloud; larger clouds are rejected.";
+    "max_range_m": "Points farther from the origin of the headset are rejected.";
+    "require_labels": "Whether clouds without labels are rejected; otherwise they are registered by geometry only.";
+    "max_map_voxels": "Voxel limit of the followed map.";
+    "search": "Condition for a search without a request: lost (at each cloud while the headset's pose is unknown) or asked (never).";
+    "when_busy": "Policy for a request while another is in progress: reject, or supersede (cancel the earlier one).";
+    "max_headset_scans": "Limit of clouds of one session per search.";
+    "headset_scan_period_s": "Time within which a cloud replaces the previous one.";
+    "track": "Whether a known pose is refined by each cloud.";
+    "lost_after": "Consecutive failed searches before a known pose is dropped.";
+    "doubt_below": "Inlier fraction, relative to that of the calibration, below which a cloud is searched alone: it may be mirrored, or the headset may have moved.";
+    "map_refresh_s": "Longest use of an outdated state of a changing map for tracking.";
+    "profile" fixed("the defaults of others follow from it"): "Sensor of the clouds: headset, lidar (may lean), depth_camera, or auto (detected from range, density and noise of each cloud); it sets the defaults of the search parameters.";
+    "min_points": "Smallest number of points of a search.";
+    "registered_points": "Approximate number of registered points; larger clouds are thinned.";
     "noise_m": "Standard deviation of the headset's points.";
-    "region_m": "Standard deviation of the place of whole regions of them, and side of such regions.";
+    "region_m": "Standard deviation of correlated position errors within a region of points, and the size of a region.";
     "scale_sigma": "Standard deviation of the headset's scale.";
-    "max_scale_error": "Share by which the scale of a cloud may differ from 1 for it to be OK.";
-    "estimate_scale": "Whether clouds of any scale are scaled to the map; the pose is then that of the scaled cloud, and track, which scales nothing, is to be false.";
-    "trust_axes": "Whether axes, handedness and scale of the clouds are certain: no others are tried then, which takes a fifth less time or more.";
-    "gravity_sigma_rad": "Standard deviation of the tilt between map and headset, as far as gravity tells; 0 if one of them does not know where down is.";
-    "agreement": "Share of places where equal class numbers of headset and map are expected to agree before anything was learned; 0 if their numbers have nothing to do with each other.";
-    "guess_radius_m": "How far the answer may be from a guess.";
-    "guess_yaw_rad": "How far the heading of the answer may be from that of a guess.";
-    "max_p_wrong": "Largest probability that another pose is right, for a pose to be OK.";
-    "min_inliers": "Share of the points that must lie on the map for it.";
-    "max_contradicted": "Share of the lines of sight that may end before a surface of the map, with nothing of it there, or go through one.";
-    "max_sigma_m": "Most standard deviation of a place in its least sure direction for it.";
-    "max_sigma_rad": "Most standard deviation of a rotation about any axis for it.";
-    "tf_rate_hz": "How often /tf map -> headset_origin is published while it is known.";
-    "threads" fixed("the pool is made with it"): "Threads that search; 0: one less than the machine has.";
+    "max_scale_error": "Largest deviation of the scale from 1 for OK, as a fraction.";
+    "estimate_scale": "Whether the scale of clouds is estimated; the pose is then that of the scaled cloud, and track, which estimates no scale, must be false.";
+    "trust_axes": "Whether axis convention and scale of the clouds are certain: no others are tested then, which saves a fifth of the time or more.";
+    "gravity_sigma_rad": "Standard deviation of the tilt between map and headset by gravity; 0 if the gravity direction of one of them is unknown.";
+    "agreement": "Prior fraction of places where equal class numbers of headset and map agree; 0 if the numbers are unrelated.";
+    "guess_radius_m": "Largest distance of the result from a guess.";
+    "guess_yaw_rad": "Largest heading difference of the result from a guess.";
+    "max_p_wrong": "Largest probability of error for OK.";
+    "min_inliers": "Smallest inlier fraction for OK.";
+    "max_contradicted": "Largest fraction of contradicted lines of sight for OK: those that end before a surface of the map, or pass through one.";
+    "max_sigma_m": "Largest standard deviation of the position in its weakest direction for OK.";
+    "max_sigma_rad": "Largest standard deviation of a rotation about any axis for OK.";
+    "tf_rate_hz": "Rate of /tf map -> headset_origin while it is known.";
+    "threads" fixed("the pool is made with it"): "Search threads; 0: one less than the number of cores.";
 };
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub server: ServerOptions,
     pub limits: ComputeLimits,
@@ -78,7 +78,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

@@ -2,17 +2,17 @@
 
 use super::*;
 
-/// Poses that differ by less are published as one, m and rad.
+/// Smaller pose differences are not published, m and rad.
 const SAME_POSE: (f64, f64) = (0.005, 0.002);
-/// Poses that differ by more are of another origin, m and rad.
+/// Larger pose differences mean another origin, m and rad.
 const MOVED: (f64, f64) = (0.3, 0.1);
-/// After a doubt that was not confirmed there is none for this time, ns.
+/// Time after an unconfirmed doubt without further ones, ns.
 const DOUBT_AGAIN_NS: i64 = 10_000_000_000;
-/// A tracked pose is published again after this time though nothing has changed, ns.
+/// Period of republishing an unchanged tracked pose, ns.
 const PUBLISH_AGAIN_NS: i64 = 5_000_000_000;
 
 impl SemanticIcpServer {
-    /// A search has ended.
+    /// Handles the end of a search.
     pub(super) fn searched(
         &mut self,
         running: &Running,
@@ -45,7 +45,7 @@ impl SemanticIcpServer {
             && !rejected
             && found.verdict != Verdict::Ok
         {
-            // The look alone does not tell more than that it fits.
+            // The scan alone only shows that it fits.
             self.hold(running, update, now_ns, out);
             return;
         }
@@ -53,15 +53,14 @@ impl SemanticIcpServer {
             .current
             .as_ref()
             .map(|current| current.map_from_headset);
-        let moved =
-            before.is_some_and(|before| !is_near(&before, &found.target_from_source, MOVED));
+        let moved = before.is_some_and(|before| !is_near(&before, &found.target_from_source, MOVED));
         if running.confirms {
             self.counts.confirmations += 1;
             self.counts.poses_withdrawn += u64::from(moved);
             match &mut self.current {
-                // Together they fit best elsewhere: what one of them told is not so.
+                // Together the scans fit best elsewhere, which contradicts the earlier single scan.
                 _ if moved => self.current = None,
-                // They tell no more than that each fits.
+                // The search only shows that each scan fits.
                 Some(current) if found.verdict != Verdict::Ok => {
                     current.looks = running.headset_scans.len();
                     self.answer_found(running.caller, found.verdict, &result, out);
@@ -74,7 +73,7 @@ impl SemanticIcpServer {
             Verdict::Ok => {
                 self.misses = 0;
                 if moved {
-                    // The headset has another origin than for the looks before.
+                    // The headset's origin differs from that of the earlier scans.
                     self.headset_scans.clear();
                 }
                 self.headset_scans.remove(&running.headset_scans);
@@ -90,17 +89,17 @@ impl SemanticIcpServer {
                 out.push(Output::Transform(self.transform(&current, now_ns)));
                 self.current = Some(current);
             }
-            // These looks say nothing, and would spoil the next search.
+            // These scans would degrade the next search.
             Verdict::RejectedInput => self.headset_scans.remove(&running.headset_scans),
             Verdict::NoOverlap => {
                 self.headset_scans.remove(&running.headset_scans);
                 self.missed();
             }
-            // A further look may tell.
+            // A further scan may resolve it.
             Verdict::Ambiguous | Verdict::Degenerate => self.missed(),
         }
         self.answer_found(running.caller, found.verdict, &result, out);
-        // That a place was confirmed is no news, and no answer to the cloud that came last.
+        // A confirmation does not change the pose, and does not belong to the last cloud.
         if !running.confirms || moved {
             self.publish(result, now_ns, out);
         }
@@ -129,7 +128,7 @@ impl SemanticIcpServer {
         }
     }
 
-    /// The map cannot be used.
+    /// Handles an unusable map.
     pub(super) fn no_map(
         &mut self,
         running: &Running,
@@ -150,7 +149,7 @@ impl SemanticIcpServer {
         self.publish(result, now_ns, out);
     }
 
-    /// The known pose was refined, or did not fit.
+    /// Handles the result of tracking.
     pub(super) fn tracked(
         &mut self,
         running: &Running,
@@ -163,7 +162,7 @@ impl SemanticIcpServer {
         };
         let inliers = current.result.inlier_fraction;
         let update = update.filter(|update| update.fits);
-        // A mirrored cloud has the same floor: it fits somewhat.
+        // A mirrored cloud has the same floor and fits in part.
         let in_doubt = |u: &TrackUpdate| {
             let too_few = u.inlier_fraction < self.options.doubt_below * inliers;
             too_few && now_ns >= self.doubt_again_ns
@@ -174,7 +173,7 @@ impl SemanticIcpServer {
         }
         self.counts.tracking_misses += u64::from(update.is_none());
         self.counts.tracking_doubts += u64::from(update.is_some());
-        // Is the cloud not what it should be, or the headset not where it was?
+        // The cloud may be mirrored, or the headset may have moved.
         let work = Work::Calibrate {
             headset_scans: running.headset_scans.clone(),
             start: None,
@@ -185,7 +184,7 @@ impl SemanticIcpServer {
         }
     }
 
-    /// A look fits the known pose, which it has refined.
+    /// Handles a scan that fits and has refined the current pose.
     fn hold(&mut self, running: &Running, update: TrackUpdate, now_ns: i64, out: &mut Vec<Output>) {
         let Some(current) = &mut self.current else {
             return;
@@ -198,7 +197,7 @@ impl SemanticIcpServer {
         result.inlier_fraction = update.inlier_fraction;
         result.rmse_m = update.rmse_m;
         result.method = "tracking".into();
-        result.reason = "the look fits where the headset is".into();
+        result.reason = "the scan fits the current pose".into();
         (result.gazes, result.points) = running.gazes_and_points();
         result.duration_s = now_ns.saturating_sub(running.begun_ns) as f64 * 1e-9;
         self.describe(&mut result, running.stamp_ns);

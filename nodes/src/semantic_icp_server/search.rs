@@ -1,4 +1,4 @@
-//! Searches and tracking as jobs for another thread.
+//! Search and tracking jobs for another thread.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -13,21 +13,21 @@ use nalgebra::Isometry3;
 
 use super::ByProfile;
 
-/// A map to be made ready.
+/// A map to prepare.
 #[derive(Clone, Debug)]
 pub struct MapCloud {
-    /// The mean point of each voxel, with labels.
+    /// Mean point of each voxel, with labels.
     pub cloud: SemanticCloud,
-    /// Side of a cube as large as a voxel, m.
+    /// Cell size (edge of the cube of equal volume), m.
     pub cell_side_m: f64,
 }
 
-/// Finds poses; made for the thread that calculates.
+/// Pose search, used on the compute thread.
 pub trait Search: Send + 'static {
-    /// Forgets the confusions of labels that it learned.
+    /// Resets the learned label confusion.
     fn reset_label_confusion(&mut self);
 
-    /// Makes a map ready, for all that follows. The error says why it cannot be used.
+    /// Prepares a map for all further jobs. The error is the reason why it cannot be used.
     fn prepare(&mut self, map: MapCloud) -> Result<(), String>;
 
     /// Searches the map.
@@ -38,7 +38,7 @@ pub trait Search: Send + 'static {
         progress: &dyn Progress,
     ) -> Calibration;
 
-    /// Refines `map_from_headset` by a look; `None` without a map.
+    /// Refines `map_from_headset` with a scan; `None` without a map.
     fn track(
         &mut self,
         headset_scan: &SourceCloud,
@@ -46,18 +46,18 @@ pub trait Search: Send + 'static {
     ) -> Option<TrackUpdate>;
 }
 
-/// The search of the core.
+/// Search with the core library.
 pub struct LatticeSearch {
     options: Arc<Mutex<ByProfile>>,
     map: Option<CalibrationMap>,
-    /// Confusions of labels learned so far.
+    /// Label confusion learned so far.
     confusion: Option<Confusion>,
-    /// Profile of the clouds of the last calibration that was OK, which tracking keeps: one look of them may seem otherwise.
+    /// Profile of the last calibration that was OK, which tracking keeps: a single scan may be misclassified.
     profile: Profile,
 }
 
 impl LatticeSearch {
-    /// Without a map.
+    /// Search without a map.
     pub fn new(options: ByProfile) -> Self {
         Self {
             options: Arc::new(Mutex::new(options)),
@@ -67,7 +67,7 @@ impl LatticeSearch {
         }
     }
 
-    /// The options, for the next job to go by.
+    /// Options of the next job.
     pub fn options(&self) -> Arc<Mutex<ByProfile>> {
         Arc::clone(&self.options)
     }
@@ -123,48 +123,48 @@ impl Search for LatticeSearch {
     }
 }
 
-/// Work of a job.
+/// Task of a job.
 #[derive(Clone, Debug)]
 pub enum Work {
-    /// A pose by several looks, near a start if there is one.
+    /// Estimate the pose from several scans, near a start if given.
     Calibrate {
-        /// The looks.
+        /// The scans.
         headset_scans: Vec<Arc<SourceCloud>>,
-        /// `map_from_headset`, about.
+        /// Approximate `map_from_headset`.
         start: Option<Isometry3<f64>>,
     },
-    /// The known pose by one more look.
+    /// Refine the current pose with one scan.
     Track {
-        /// The look.
+        /// The scan.
         headset_scan: Arc<SourceCloud>,
-        /// The pose.
+        /// The current pose.
         map_from_headset: Isometry3<f64>,
     },
 }
 
-/// One calculation.
+/// A search or tracking job.
 #[derive(Clone, Debug)]
 pub struct Job {
     /// Its number.
     pub id: u64,
-    /// Confusions of labels learned before do not hold any more.
-    pub reset_labels: bool,
-    /// A map to be made ready first.
+    /// Learned label confusions are obsolete.
+    pub reset_label_confusion: bool,
+    /// Map to prepare first.
     pub map: Option<MapCloud>,
-    /// Work of a job.
+    /// Task.
     pub work: Work,
-    /// Is set when the calculation is to end early.
+    /// Cancellation flag.
     pub canceled: Arc<AtomicBool>,
 }
 
 /// Result of a job.
 #[derive(Clone, Debug)]
 pub enum Done {
-    /// The search has ended.
+    /// Result of a search.
     Calibrated(Box<Calibration>),
-    /// The pose was refined; `None`: there is no map.
+    /// Result of tracking; `None`: there is no map.
     Tracked(Option<TrackUpdate>),
-    /// The map cannot be used, for this reason.
+    /// Reason why the map cannot be used.
     NoMap(String),
 }
 
@@ -184,9 +184,9 @@ impl<F: Fn(Stage, f64) + Sync> Progress for Watch<'_, F> {
 }
 
 impl Job {
-    /// Calculates; `on_progress` is called with the stage and its fraction.
+    /// Runs the job; `on_progress` is called with the stage and its fraction.
     pub fn run(self, search: &mut dyn Search, on_progress: impl Fn(Stage, f64) + Sync) -> Done {
-        if self.reset_labels {
+        if self.reset_label_confusion {
             search.reset_label_confusion();
         }
         if let Some(map) = self.map

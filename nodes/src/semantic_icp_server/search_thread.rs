@@ -1,4 +1,4 @@
-//! Thread that searches, and the way back of what it finds.
+//! Search thread, and its events for the server.
 
 use std::io;
 use std::sync::{Arc, Mutex};
@@ -9,28 +9,28 @@ use super::search::{Done, Job, Search};
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use lattice_runtime::{Shutdown, lock};
 
-/// Events of the search thread.
+/// Progress and results that the server has not taken yet.
 #[derive(Default)]
 struct SearchEvents {
     progress: Option<(u64, Stage, f64)>,
     done: Vec<(u64, Done)>,
 }
 
-/// Searches on a thread of its own, one job after another.
+/// Thread that runs one job after another.
 pub(super) struct SearchThread {
     compute: Compute<Option<Job>>,
     events: Arc<Mutex<SearchEvents>>,
 }
 
-/// Takes jobs for a [`SearchThread`], and has what became of them.
+/// Port for jobs and events of a [`SearchThread`].
 pub(super) struct SearchPort {
     inbox: Inbox<Option<Job>>,
     events: Arc<Mutex<SearchEvents>>,
 }
 
 impl SearchThread {
-    /// Starts the thread with a pool of `threads`; `wake` is called on it on every event, and
-    /// may be missed: events stay until they are taken.
+    /// Starts the thread with a pool of `threads`; it calls `wake` at each event. A failed
+    /// `wake` loses nothing: events stay until they are taken.
     pub fn spawn(
         name: &str,
         threads: usize,
@@ -61,7 +61,7 @@ impl SearchThread {
         Ok(Self { compute, events })
     }
 
-    /// Port at which jobs are handed in.
+    /// Port for jobs and events.
     pub fn port(&self) -> SearchPort {
         SearchPort {
             inbox: self.compute.inbox(),
@@ -69,19 +69,19 @@ impl SearchThread {
         }
     }
 
-    /// Waits for the job at work, and ends the thread.
+    /// Waits for the running job, and ends the thread.
     pub fn finish(self) {
         self.compute.finish_with(None);
     }
 }
 
 impl SearchPort {
-    /// Hands in a job. False: the thread has ended, or has two already.
+    /// Queues a job. False: the thread has ended, or has two jobs already.
     pub fn begin(&self, job: Job) -> bool {
         self.inbox.send(Some(job), 0)
     }
 
-    /// Progress of the running job since the last call.
+    /// New progress of the running job, if any.
     pub fn take_progress(&self) -> Option<(u64, Stage, f64)> {
         lock(&self.events).progress.take()
     }

@@ -1,43 +1,43 @@
-//! State of the server: the running job, the search that waits, the known pose.
+//! State of the server: the running job, the pending request, the current pose.
 
 use super::*;
 
-/// Pending search, with its caller.
+/// A search request that waits for the running job, with its caller.
 #[derive(Default)]
 pub(super) struct PendingRequest {
     pub caller: Option<CallId>,
     pub start: Option<Isometry3<f64>>,
 }
 
-/// Current calibration of the headset.
+/// Current pose of the headset and the result of its search.
 pub(super) struct CurrentCalibration {
     pub map_from_headset: Isometry3<f64>,
     /// Result of the search that found it.
     pub result: CalibrationResult,
-    /// Looks that it was searched with, in vain or not, since it is known.
+    /// Number of scans of the last confirming search, successful or not.
     pub looks: usize,
 }
 
-/// A job that is being calculated.
+/// A running job.
 pub(super) struct Running {
     pub job: u64,
     pub caller: Option<CallId>,
     pub canceled: Arc<AtomicBool>,
-    /// Its outcome is to be ignored.
+    /// True if its result is to be ignored.
     pub outdated: bool,
     pub begun_ns: i64,
     pub stamp_ns: i64,
-    /// Looks of a search; of tracking the one look.
+    /// Scans of a search, or the single scan of tracking.
     pub headset_scans: Vec<Arc<SourceCloud>>,
     pub tracking: bool,
-    /// Of a search with a look that fits the known pose, yet less than it should: how it fits.
+    /// Fit of the scan to the current pose, for a search started by a poor fit.
     pub doubted: Option<TrackUpdate>,
-    /// True of a search that is to confirm the known pose with more looks.
+    /// True for a search that confirms the current pose with more scans.
     pub confirms: bool,
 }
 
 impl Running {
-    /// Number of looks, and of points in them.
+    /// Number of scans, and of their points.
     pub fn gazes_and_points(&self) -> (u32, u64) {
         let points = self
             .headset_scans
@@ -48,7 +48,7 @@ impl Running {
 }
 
 impl SemanticIcpServer {
-    /// Goes on with other options; the searcher has its own.
+    /// Changes the options; the search has its own.
     pub fn set_options(&mut self, options: ServerOptions) {
         self.follower.set_max_voxels(options.max_map_voxels);
         let period_ns = options.headset_scan_period_ns;
@@ -57,7 +57,7 @@ impl SemanticIcpServer {
         self.options = options;
     }
 
-    /// Begins what is due, if nothing is being calculated.
+    /// Starts pending work, unless a job is running.
     pub(super) fn go_on(&mut self, now_ns: i64, out: &mut Vec<Output>) {
         if self.running.is_some() {
             return;
@@ -86,8 +86,8 @@ impl SemanticIcpServer {
         }
     }
 
-    /// Begins a search that confirms the known pose, if there are more looks than it was found with: one look alone
-    /// can fit elsewhere as well.
+    /// Starts a confirming search if there are more scans than the current pose was found with: a single scan
+    /// may fit elsewhere as well.
     pub(super) fn confirm(&mut self, now_ns: i64, out: &mut Vec<Output>) {
         let looks = self.headset_scans.len();
         let is_due = self
@@ -104,7 +104,7 @@ impl SemanticIcpServer {
         }
     }
 
-    /// Begins a search with all clouds that are kept.
+    /// Starts a search with all stored clouds.
     fn search_all(&mut self, pending: PendingRequest, now_ns: i64, out: &mut Vec<Output>) {
         self.fresh_cloud = false;
         let work = Work::Calibrate {
@@ -115,7 +115,7 @@ impl SemanticIcpServer {
         self.begin(work, pending.caller, stamp_ns, now_ns, out);
     }
 
-    /// Makes a job of the work, with the map if the searcher has an old one.
+    /// Starts a job, with the map if the search has an outdated one.
     pub(super) fn begin(
         &mut self,
         work: Work,
@@ -145,7 +145,7 @@ impl SemanticIcpServer {
         };
         out.push(Output::Job(Job {
             id: self.next_job,
-            reset_labels: std::mem::take(&mut self.reset_labels),
+            reset_label_confusion: std::mem::take(&mut self.reset_label_confusion),
             map: self.map_to_prepare(now_ns, map_age_ns),
             work,
             canceled: Arc::clone(&running.canceled),
@@ -153,7 +153,7 @@ impl SemanticIcpServer {
         self.running = Some(running);
     }
 
-    /// The map, if it has changed since the searcher got it and that was `age_ns` ago.
+    /// The map, if it has changed and its last transfer was `age_ns` ago.
     fn map_to_prepare(&mut self, now_ns: i64, age_ns: i64) -> Option<MapCloud> {
         let map = self.follower.map()?;
         let (epoch, sequence) = (map.info.epoch, self.follower.sequence());
@@ -170,7 +170,7 @@ impl SemanticIcpServer {
         })
     }
 
-    /// Ends what is being calculated; whoever waits for it is answered with the reason.
+    /// Ends the running job; its caller receives the reason.
     pub(super) fn end_running(&mut self, why: &str, out: &mut Vec<Output>) {
         let Some(running) = &mut self.running else {
             return;
@@ -188,7 +188,7 @@ impl SemanticIcpServer {
         }
     }
 
-    /// A result without a pose.
+    /// Result without a pose.
     pub(super) fn result(&self, verdict: u8, reason: &str) -> CalibrationResult {
         let mut result = CalibrationResult {
             verdict,

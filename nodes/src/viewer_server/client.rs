@@ -1,4 +1,4 @@
-//! Client of a hub: its outbox, what it watches and the pace of its refusals.
+//! One client of the broadcaster: its outbox, watched parameters and rate of rejection notices.
 
 use std::time::Duration;
 
@@ -10,23 +10,23 @@ use super::outbox::{Outbox, Outgoing};
 use super::protocol::status;
 use super::watched::Watched;
 
-/// Time between two words to a client about messages that were refused.
+/// Period of rejection notices to a client.
 const WORDS_PERIOD: Duration = Duration::from_secs(1);
 
-/// A client: what waits for it and what it wants to hear of.
+/// A client: its queued messages and its interests.
 pub(super) struct Client {
     pub outbox: Outbox,
     wake: Sender<()>,
     pub watched: Watched,
-    /// True for one that follows the graph of nodes.
+    /// True while it follows the node graph.
     pub follows_graph: bool,
-    /// True after it has taken all that there was.
+    /// True after it has taken all messages.
     pub idle: bool,
     refusals: Throttle,
 }
 
 impl Client {
-    /// A client that comes now; `wake` wakes it.
+    /// A new client; `wake` wakes its task.
     pub fn new(outbox: Outbox, wake: Sender<()>) -> Self {
         Self {
             outbox,
@@ -38,23 +38,23 @@ impl Client {
         }
     }
 
-    /// Lets it look for what waits.
+    /// Wakes its task.
     pub fn wake(&mut self) {
         self.idle = false;
-        // One wake is enough.
+        // One pending wake is enough.
         let _ = self.wake.try_send(());
     }
 
-    /// Puts a message of the protocol before what waits.
-    pub fn tell(&mut self, message: Outgoing) {
+    /// Queues a protocol message ahead of data.
+    pub fn enqueue(&mut self, message: Outgoing) {
         self.outbox.answer(message);
         self.wake();
     }
 
-    /// Tells it of a refusal, where it was not told of one just now.
+    /// Queues a rejection notice, unless one was sent recently.
     pub fn refuse(&mut self, refusal: InputRefusal) {
         if self.refusals.check().is_some() {
-            self.tell(Outgoing::Text(status(refusal.words())));
+            self.enqueue(Outgoing::Text(status(refusal.words())));
         }
     }
 }

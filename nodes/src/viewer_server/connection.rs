@@ -1,4 +1,4 @@
-//! One connection: its request, then nothing more or a WebSocket.
+//! One connection: its request, then a response or a WebSocket.
 
 use std::io;
 use std::net::{IpAddr, TcpStream};
@@ -16,61 +16,61 @@ use smol::channel::Receiver;
 use smol::future::{or, pending, poll_once, yield_now};
 use smol::{Async, Timer};
 
-use super::desk::{Desk, Step};
-use super::flow::Flow;
-use super::http::{Decision, Gate, Head, HeadError, MAX_HEAD_BYTES, Response};
-use super::hub::Hub;
+use super::broadcaster::Broadcaster;
+use super::client_session::{ClientSession, SessionAction};
+use super::connection_limit::ConnectionLimit;
+use super::http::{Decision, Head, HeadError, MAX_HEAD_BYTES, RequestAuth, Response};
 use super::inputs::{Input, InputRefusal};
 use super::offer::{MAX_MESSAGE_BYTES, MESSAGE_HEAD_BYTES};
 use super::outbox::Outgoing;
 use super::protocol::message_data;
-use super::room::Room;
+use super::rate_limit::RateLimit;
 use super::stream::{ClientStream, Progress};
 
-/// Time for a request to come.
+/// Timeout of receiving a request.
 const HEAD_TIME: Duration = Duration::from_secs(5);
-/// Time for a file of the page, or a refusal, to be taken.
+/// Timeout of sending a response.
 const ANSWER_TIME: Duration = Duration::from_secs(20);
-/// Time for the reason of an end to be taken.
+/// Timeout of sending the close reason.
 const LAST_TIME: Duration = Duration::from_secs(1);
-/// Bytes that the kernel keeps until a client takes them.
+/// Socket send buffer, bytes.
 const SEND_BUFFER_BYTES: usize = 512 << 10;
 
 type Stream = Async<TcpStream>;
 
-/// Room for connections that are no client; clients have [`Hub`]'s.
+/// Limits of connections before they become clients; clients are limited by [`Broadcaster`].
 #[derive(Default)]
-pub struct Rooms {
-    /// Those whose request has not come.
-    asking: Rc<Room>,
-    /// Those that are answered.
-    answered: Rc<Room>,
+pub struct ConnectionLimits {
+    /// Connections with an incomplete request.
+    asking: Rc<ConnectionLimit>,
+    /// Connections whose response is being sent.
+    answered: Rc<ConnectionLimit>,
 }
 
-/// Serves a connection to its end.
+/// Serves a connection until it ends.
 pub async fn serve(
     stream: TcpStream,
     from: IpAddr,
-    gate: Arc<Gate>,
-    hub: Arc<Hub>,
-    rooms: &Rooms,
+    auth: Arc<RequestAuth>,
+    broadcaster: Arc<Broadcaster>,
+    limits: &ConnectionLimits,
 ) -> io::Result<()> {
     rustix::net::sockopt::set_socket_send_buffer_size(&stream, SEND_BUFFER_BYTES)?;
     stream.set_nodelay(true)?;
     let mut stream = Async::new(stream)?;
-    let asking = rooms.asking.enter(from);
-    hub.count_displaced(rooms.asking.take_displaced());
+    let asking = limits.asking.enter(from);
+    broadcaster.count_displaced(limits.asking.take_displaced());
     let head = within(HEAD_TIME, read_head(&mut stream));
     let head = asking.served(head).await?;
     drop(asking);
-    let answer = match head.map(|head| gate.decide(&head)) {
-        Ok(Decision::Upgrade(head)) => match hub.enter() {
+    let answer = match head.map(|head| auth.decide(&head)) {
+        Ok(Decision::Upgrade(head)) => match broadcaster.enter() {
             Some((id, woken)) => {
-                let done = talk(ClientStream::new(stream), head, id, woken, &hub).await;
+                let done = talk(ClientStream::new(stream), head, id, woken, &broadcaster).await;
                 if matches!(&done, Err(error) if error.kind() == io::ErrorKind::TimedOut) {
-                    hub.count_stalled();
+                    broadcaster.count_stalled();
                 }
-                hub.leave(id);
+                broadcaster.leave(id);
                 return done;
             }
             None => Response::full(),
@@ -81,8 +81,8 @@ pub async fn serve(
             Response::bad_request()
         }
     };
-    let answered = rooms.answered.enter(from);
-    hub.count_displaced(rooms.answered.take_displaced());
+    let answered = limits.answered.enter(from);
+    broadcaster.count_displaced(limits.answered.take_displaced());
     let answer = async {
         stream.write_all(&answer.bytes()).await?;
         stream.close().await
@@ -104,37 +104,37 @@ async fn read_head(stream: &mut Stream) -> io::Result<Result<Head, HeadError>> {
         length += read;
         match Head::parse(bytes.get(..length).unwrap_or_default()) {
             Ok(None) => {}
-            // Nobody who speaks the protocol sends more before the answer.
+            // Clients send nothing more before the response.
             Ok(Some((head, _))) => return Ok(Ok(head)),
             Err(error) => return Ok(Err(error)),
         }
     }
 }
 
-/// Sends what waits and takes what comes until either side ends it.
+/// Sends queued messages and handles received ones until either side closes.
 async fn talk(
     mut stream: ClientStream,
     head: String,
     id: u64,
     woken: Receiver<()>,
-    hub: &Hub,
+    broadcaster: &Broadcaster,
 ) -> io::Result<()> {
     let progress = stream.progress();
     progress.sent(stream.write_all(head.as_bytes())).await?;
-    let offer = hub.offer_of_bridge();
+    let offer = broadcaster.offer_of_bridge();
     let longest = Some(offer.max_message_bytes());
     let config = WebSocketConfig::default()
         .max_message_size(longest)
         .max_frame_size(longest);
     let mut socket = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
-    let mut desk = Desk::new(offer);
-    let mut flow = Flow::new(offer.stream_bytes_per_s, Instant::now());
+    let mut session = ClientSession::new(offer);
+    let mut rate_limit = RateLimit::new(offer.stream_bytes_per_s, Instant::now());
     let mut asked = FuturesUnordered::new();
     loop {
-        // What has come goes first: who unsubscribes gets no more.
+        // Received messages first, so that an unsubscription takes effect at once.
         let event = match poll_once(socket.next()).await {
             Some(come) => Event::Come(come),
-            None => match hub.next(id) {
+            None => match broadcaster.next(id) {
                 Some(next) => {
                     send(&mut socket, &progress, next).await?;
                     continue;
@@ -156,64 +156,66 @@ async fn talk(
             },
         };
         if matches!(event, Event::Come(_)) {
-            // A client that sends without end does not hold up the others of this thread.
+            // A client that sends continuously must not block the others of this thread.
             yield_now().await;
         }
         let step = match event {
-            Event::Woken => Step::Done,
+            Event::Woken => SessionAction::Done,
             Event::Answered(messages) => {
-                desk.answered();
+                session.answered();
                 messages
                     .into_iter()
-                    .for_each(|message| hub.tell(id, message));
-                Step::Done
+                    .for_each(|message| broadcaster.enqueue(id, message));
+                SessionAction::Done
             }
-            // Before anything is made of it.
-            Event::Come(Some(Ok(message))) if !is_paced(&mut flow, message.len()) => {
+            // Rate limited before parsing.
+            Event::Come(Some(Ok(message))) if !is_paced(&mut rate_limit, message.len()) => {
                 let refusal = InputRefusal::TooMuch;
-                if let Some(bridge) = hub.bridge() {
+                if let Some(bridge) = broadcaster.bridge() {
                     bridge.inputs().refused(refusal);
                 }
-                hub.refuse(id, refusal);
-                Step::Done
+                broadcaster.refuse(id, refusal);
+                SessionAction::Done
             }
-            Event::Come(Some(Ok(Message::Text(text)))) => desk.text(&text),
-            Event::Come(Some(Ok(Message::Binary(bytes)))) => desk.data(&bytes),
+            Event::Come(Some(Ok(Message::Text(text)))) => session.on_text(&text),
+            Event::Come(Some(Ok(Message::Binary(bytes)))) => session.on_binary(&bytes),
             Event::Come(Some(Ok(Message::Close(_))) | None) => return Ok(()),
-            // Before more is read, or a client that pings without end would fill the memory with answers.
+            // Flushed before reading more: continuous pings would fill the memory with pongs.
             Event::Come(Some(Ok(Message::Ping(_)))) => {
                 let answer = async { socket.flush().await.map_err(io::Error::other) };
                 progress.sent(answer).await?;
-                Step::Done
+                SessionAction::Done
             }
-            Event::Come(Some(Ok(_))) => Step::Done,
+            Event::Come(Some(Ok(_))) => SessionAction::Done,
             Event::Come(Some(Err(error))) => {
                 if matches!(error, tungstenite::Error::Capacity(_)) {
-                    too_long(&mut socket, hub).await;
+                    too_long(&mut socket, broadcaster).await;
                 }
                 return Err(io::Error::other(error));
             }
         };
         match step {
-            Step::Subscribe(wishes) => {
+            SessionAction::Subscribe(wishes) => {
                 for wish in wishes {
-                    hub.subscribe(id, wish.id, wish.channel_id);
+                    broadcaster.subscribe(id, wish.id, wish.channel_id);
                 }
             }
-            Step::Watch(names, watch) => hub.watch(id, names, watch),
-            Step::Graph(follow) => hub.follow_graph(id, follow),
-            Step::Unsubscribe(subscriptions) => hub.unsubscribe(id, &subscriptions),
-            Step::Ask(ask) => match hub.bridge() {
-                Some(bridge) => asked.push(bridge.ask(ask)),
-                None => desk.answered(),
+            SessionAction::Watch(names, watch) => broadcaster.watch(id, names, watch),
+            SessionAction::Graph(follow) => broadcaster.follow_graph(id, follow),
+            SessionAction::Unsubscribe(subscriptions) => {
+                broadcaster.unsubscribe(id, &subscriptions)
+            }
+            SessionAction::Request(request) => match broadcaster.bridge() {
+                Some(bridge) => asked.push(bridge.request(request)),
+                None => session.answered(),
             },
-            Step::Input(input) => {
-                if let Some(refusal) = take(hub, id, &mut flow, input) {
-                    hub.refuse(id, refusal);
+            SessionAction::Input(input) => {
+                if let Some(refusal) = take(broadcaster, id, &mut rate_limit, input) {
+                    broadcaster.refuse(id, refusal);
                 }
             }
-            Step::Tell(text) => hub.tell(id, Outgoing::Text(text)),
-            Step::Done => {}
+            SessionAction::Reply(text) => broadcaster.enqueue(id, Outgoing::Text(text)),
+            SessionAction::Done => {}
         }
     }
 }
@@ -225,18 +227,23 @@ enum Event {
     Woken,
 }
 
-/// True of a message that is short, as questions are, or that comes at the pace of headsets.
-fn is_paced(flow: &mut Flow, bytes: usize) -> bool {
-    bytes <= MAX_MESSAGE_BYTES || flow.admits(bytes, Instant::now())
+/// True for a short message, or one within the rate limit of headsets.
+fn is_paced(rate_limit: &mut RateLimit, bytes: usize) -> bool {
+    bytes <= MAX_MESSAGE_BYTES || rate_limit.admits(bytes, Instant::now())
 }
 
-/// Hands a message for a headset over, at the pace of its client; what is refused is counted.
-fn take(hub: &Hub, id: u64, flow: &mut Flow, input: Input) -> Option<InputRefusal> {
-    let bridge = hub.bridge()?;
-    // A long one was asked for its pace when it came.
+/// Passes a headset message to the bridge within the client's rate limit; rejected ones are counted.
+fn take(
+    broadcaster: &Broadcaster,
+    id: u64,
+    rate_limit: &mut RateLimit,
+    input: Input,
+) -> Option<InputRefusal> {
+    let bridge = broadcaster.bridge()?;
+    // A long message was charged on reception.
     let head_and_message = input.bytes.len() + MESSAGE_HEAD_BYTES;
     let is_long = head_and_message > MAX_MESSAGE_BYTES;
-    let taken = match is_long || flow.admits(input.bytes.len(), Instant::now()) {
+    let taken = match is_long || rate_limit.admits(input.bytes.len(), Instant::now()) {
         true => bridge.take(id, input),
         false => Err(InputRefusal::TooMuch),
     };
@@ -245,32 +252,32 @@ fn take(hub: &Hub, id: u64, flow: &mut Flow, input: Input) -> Option<InputRefusa
     Some(refusal)
 }
 
-/// Tells why the connection ends: what comes next of it cannot be told from the rest of the message.
-async fn too_long(socket: &mut WebSocketStream<ClientStream>, hub: &Hub) {
-    let has_headset = hub.offer_of_bridge().stream_bytes_per_s > 0;
-    if let Some(bridge) = hub.bridge().filter(|_| has_headset) {
+/// Closes the connection with a reason: the rest of an oversized message cannot be skipped.
+async fn too_long(socket: &mut WebSocketStream<ClientStream>, broadcaster: &Broadcaster) {
+    let has_headset = broadcaster.offer_of_bridge().stream_bytes_per_s > 0;
+    if let Some(bridge) = broadcaster.bridge().filter(|_| has_headset) {
         bridge.inputs().refused(InputRefusal::TooLong);
     }
     let close = CloseFrame {
         code: CloseCode::Size,
         reason: match has_headset {
             true => InputRefusal::TooLong.words().into(),
-            false => "a message is longer than is taken".into(),
+            false => "the message exceeds the size limit".into(),
         },
     };
     let closed = async {
         let sent = socket.send(Message::Close(Some(close))).await;
         sent.map_err(io::Error::other)?;
-        // A socket closed with bytes unread is reset, and the reason is lost with it.
+        // Closing a socket with unread bytes resets it, which would lose the reason.
         let mut rest = vec![0; 1 << 16];
         while socket.get_mut().read(&mut rest).await? > 0 {}
         Ok(())
     };
-    // Who has gone needs no reason.
+    // The client may be gone.
     let _ = within(LAST_TIME, closed).await;
 }
 
-/// Sends one message; an error after the last.
+/// Sends one message; [`Outgoing::Close`] is an error.
 async fn send(
     socket: &mut WebSocketStream<ClientStream>,
     progress: &Progress,

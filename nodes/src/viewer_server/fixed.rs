@@ -1,4 +1,4 @@
-//! A map that does not change, shown without ROS.
+//! Viewer of a constant map, without ROS.
 
 use std::io;
 use std::sync::Arc;
@@ -9,33 +9,34 @@ use lattice_msgs::cdr;
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 
-use super::hub::{Hub, entry};
+use super::broadcaster::{Broadcaster, entry};
 use super::options::{ViewerOptions, url};
 use super::outbox::Class;
 use super::server::Server;
 use super::thin;
 use crate::convert::map::{History, MapStamp, keyframe};
 
-/// Largest message of the map.
+/// Largest map message, bytes.
 const CHUNK_BYTES: usize = 60_000;
 
-/// Serves a map; gives the server and the address to open.
+/// Serves a map; returns the server and its URL.
 pub fn serve(list: &VoxelList, options: &ViewerOptions) -> io::Result<(Server, String)> {
     serve_labelled(list, &LabelNames::new(), options)
 }
 
-/// [`serve`] with the names of the map's labels.
+/// Serves a map with the names of its labels.
 pub fn serve_labelled(
     list: &VoxelList,
     names: &LabelNames,
     options: &ViewerOptions,
 ) -> io::Result<(Server, String)> {
-    let hub = Arc::new(Hub::of_file(options.max_clients));
-    hub.map_channels("/map", "/map_updates");
+    let broadcaster = Arc::new(Broadcaster::of_file(options.max_clients));
+    broadcaster.map_channels("/map", "/map_updates");
     if !names.is_empty() {
-        let channel = hub.channel::<LabelInfo>("/label_info", Class::Newest { depth: 1 }, true);
+        let channel =
+            broadcaster.channel::<LabelInfo>("/label_info", Class::Newest { depth: 1 }, true);
         let info = cdr::to_vec(&label_info(names)).map_err(io::Error::other)?;
-        hub.offer(channel, info);
+        broadcaster.offer(channel, info);
     }
     let stamp = MapStamp {
         header: Header {
@@ -50,10 +51,10 @@ pub fn serve_labelled(
     };
     let chunks = keyframe(list, &stamp).into_iter().map(thin::both);
     let chunks: Vec<_> = chunks.collect::<Result<_, _>>().map_err(io::Error::other)?;
-    hub.change_map(|stream| stream.set_keyframe(chunks));
-    let gate = options.gate()?;
-    let server = Server::start(options.address, gate.clone(), hub)?;
-    let url = url(server.address(), &gate);
+    broadcaster.change_map(|stream| stream.set_keyframe(chunks));
+    let auth = options.request_auth()?;
+    let server = Server::start(options.address, auth.clone(), broadcaster)?;
+    let url = url(server.address(), &auth);
     Ok((server, url))
 }
 

@@ -1,4 +1,4 @@
-//! The graph of nodes, topics and services as the protocol tells it: first all, then what has changed.
+//! Graph of nodes, topics and services in the protocol: a full message, then changes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,13 +6,13 @@ use lattice_runtime::{GraphEndpoint, GraphRole};
 
 use super::protocol::{GraphUpdate, connection_graph_update};
 
-/// Most bytes of names in a graph; endpoints beyond that are left out.
+/// Limit of name bytes in a graph; further endpoints are omitted.
 const MAX_BYTES: usize = 256 << 10;
 
-/// Names of nodes by name of topic or service.
+/// Node names by topic or service name.
 type Links = BTreeMap<String, BTreeSet<String>>;
 
-/// Nodes that publish, subscribe and serve.
+/// Publishing, subscribing and serving nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ConnectionGraph {
     published: Links,
@@ -41,12 +41,12 @@ impl FromIterator<GraphEndpoint> for ConnectionGraph {
 }
 
 impl ConnectionGraph {
-    /// The message that makes `known` this graph; `None` if it is.
+    /// Message that updates `known` to this graph; `None` if they are equal.
     pub fn since(&self, known: &Self) -> Option<String> {
         (self != known).then(|| self.message(known))
     }
 
-    /// The message that tells all.
+    /// Message of the whole graph.
     pub fn whole(&self) -> String {
         self.message(&Self::default())
     }
@@ -69,8 +69,8 @@ impl ConnectionGraph {
     }
 }
 
-/// Names whose nodes are others than those known, with their nodes: none where the last one has gone, and the
-/// name stays.
+/// Names whose nodes differ from `known`, with their nodes: empty if the last one has left and the
+/// name remains.
 fn changed<'a>(
     now: &'a Links,
     known: &'a Links,

@@ -9,7 +9,7 @@ use async_tungstenite::tungstenite::client::IntoClientRequest;
 use async_tungstenite::tungstenite::{Message, WebSocket, client};
 use rustix::net::sockopt::set_socket_recv_buffer_size;
 
-use super::room::{MAX_CONNECTIONS, MAX_PER_ADDRESS};
+use super::connection_limit::{MAX_CONNECTIONS, MAX_PER_ADDRESS};
 use super::stream::STALL_TIME;
 use super::tests::{connect, data, server, text};
 use super::*;
@@ -23,13 +23,13 @@ const MOST_BYTES: usize = 64 << 20;
 const WISH: &str = r#"{"op":"subscribe","subscriptions":[{"id":6,"channelId":1}]}"#;
 
 /// A client that is let in and has subscribed to `/tf`.
-fn subscribed(server: &Server, hub: &Hub) -> WebSocket<TcpStream> {
-    let before = hub.demand(1).joined;
+fn subscribed(server: &Server, broadcaster: &Broadcaster) -> WebSocket<TcpStream> {
+    let before = broadcaster.demand(1).joined;
     let (mut socket, _) = connect(server, SUBPROTOCOLS[0]).unwrap();
     assert_eq!(text(&mut socket)["op"], "serverInfo");
     assert_eq!(text(&mut socket)["op"], "advertise");
     socket.send(Message::Text(WISH.into())).unwrap();
-    until(|| hub.demand(1).joined > before);
+    until(|| broadcaster.demand(1).joined > before);
     socket
 }
 
@@ -69,35 +69,35 @@ fn flood(socket: &WebSocket<TcpStream>, frames: &[u8]) -> usize {
 
 #[test]
 fn a_client_that_pings_and_reads_nothing_is_closed() {
-    let (server, hub) = server(4, Gate::default());
-    let mut good = subscribed(&server, &hub);
-    let hostile = subscribed(&server, &hub);
+    let (server, broadcaster) = server(4, RequestAuth::default());
+    let mut good = subscribed(&server, &broadcaster);
+    let hostile = subscribed(&server, &broadcaster);
     // 1 MB at a time.
     let pings = frame(0x89, &[7; 125]).repeat(8000);
     let taken = flood(&hostile, &pings);
     assert!(taken > pings.len());
-    until(|| hub.clients() == 1);
-    assert_eq!(hub.counts().clients_stalled, 1);
-    hub.offer(1, vec![5; 100]);
+    until(|| broadcaster.clients() == 1);
+    assert_eq!(broadcaster.counts().clients_stalled, 1);
+    broadcaster.offer(1, vec![5; 100]);
     assert_eq!(data(&mut good).1, [5; 100]);
     server.finish();
 }
 
 #[test]
 fn a_client_that_asks_and_reads_nothing_is_closed() {
-    let (server, hub) = server(4, Gate::default());
-    let hostile = subscribed(&server, &hub);
+    let (server, broadcaster) = server(4, RequestAuth::default());
+    let hostile = subscribed(&server, &broadcaster);
     // Each is answered by its problem.
     flood(&hostile, &frame(0x81, b"{}").repeat(8000));
-    until(|| hub.clients() == 0);
-    assert_eq!(hub.counts().clients_stalled, 1);
+    until(|| broadcaster.clients() == 0);
+    assert_eq!(broadcaster.counts().clients_stalled, 1);
     server.finish();
 }
 
 #[test]
 fn pings_of_a_client_that_reads_are_all_answered() {
-    let (server, hub) = server(4, Gate::default());
-    let mut socket = subscribed(&server, &hub);
+    let (server, broadcaster) = server(4, RequestAuth::default());
+    let mut socket = subscribed(&server, &broadcaster);
     let writer = socket.get_ref().try_clone().unwrap();
     const PINGS: u32 = 100_000;
     let answered = std::thread::scope(|scope| {
@@ -117,15 +117,18 @@ fn pings_of_a_client_that_reads_are_all_answered() {
             .all(|(i, n)| i == n as usize)
     });
     assert!(answered);
-    assert_eq!((hub.clients(), hub.counts().clients_stalled), (1, 0));
+    assert_eq!(
+        (broadcaster.clients(), broadcaster.counts().clients_stalled),
+        (1, 0)
+    );
     server.finish();
 }
 
 #[test]
 fn frames_without_content_hold_nobody_up() {
-    let (server, hub) = server(4, Gate::default());
-    let mut good = subscribed(&server, &hub);
-    let hostile = subscribed(&server, &hub);
+    let (server, broadcaster) = server(4, RequestAuth::default());
+    let mut good = subscribed(&server, &broadcaster);
+    let hostile = subscribed(&server, &broadcaster);
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -137,7 +140,7 @@ fn frames_without_content_hold_nobody_up() {
             }
         });
         for number in 0..100 {
-            hub.offer(1, vec![number; 10]);
+            broadcaster.offer(1, vec![number; 10]);
             assert_eq!(data(&mut good).1, [number; 10]);
         }
         done.store(true, Relaxed);
@@ -147,20 +150,20 @@ fn frames_without_content_hold_nobody_up() {
 
 #[test]
 fn half_a_frame_and_one_of_any_length_hold_nobody_up() {
-    let (server, hub) = server(4, Gate::default());
-    let mut good = subscribed(&server, &hub);
-    let mut half = subscribed(&server, &hub);
+    let (server, broadcaster) = server(4, RequestAuth::default());
+    let mut good = subscribed(&server, &broadcaster);
+    let mut half = subscribed(&server, &broadcaster);
     // 60,000 bytes are said, and 3 come.
     let begin = [0x82, 0xfe, 0xea, 0x60, 0, 0, 0, 0, 1, 2, 3];
     half.get_ref().write_all(&begin).unwrap();
-    let huge = subscribed(&server, &hub);
+    let huge = subscribed(&server, &broadcaster);
     let mut head = vec![0x82, 0xff];
     head.extend(u64::MAX.to_be_bytes());
     head[2] = 0x7f;
     head.extend([0; 4]);
     huge.get_ref().write_all(&head).unwrap();
-    until(|| hub.clients() == 2);
-    hub.offer(1, vec![3; 10]);
+    until(|| broadcaster.clients() == 2);
+    broadcaster.offer(1, vec![3; 10]);
     for socket in [&mut good, &mut half] {
         assert_eq!(
             data(socket).1,
@@ -168,7 +171,7 @@ fn half_a_frame_and_one_of_any_length_hold_nobody_up() {
             "what it has begun is its own matter"
         );
     }
-    assert_eq!(hub.counts().clients_stalled, 0);
+    assert_eq!(broadcaster.counts().clients_stalled, 0);
     server.finish();
 }
 
@@ -195,7 +198,7 @@ impl Write for Slow {
 
 #[test]
 fn a_slow_client_that_reads_gets_all_of_a_long_message() {
-    let (server, hub) = server(4, Gate::default());
+    let (server, broadcaster) = server(4, RequestAuth::default());
     let stream = TcpStream::connect(server.address()).unwrap();
     // Small, so that the server sees how slow it is.
     set_socket_recv_buffer_size(&stream, 16 << 10).unwrap();
@@ -208,9 +211,9 @@ fn a_slow_client_that_reads_gets_all_of_a_long_message() {
         .insert("Sec-WebSocket-Protocol", protocol);
     let (mut socket, _) = client(request, Slow(stream)).unwrap();
     socket.send(Message::Text(WISH.into())).unwrap();
-    until(|| hub.demand(1).joined > 0);
+    until(|| broadcaster.demand(1).joined > 0);
     let begin = Instant::now();
-    hub.offer(1, vec![9; 6 << 20]);
+    broadcaster.offer(1, vec![9; 6 << 20]);
     let whole = loop {
         match socket.read().unwrap() {
             Message::Binary(bytes) => break bytes.len(),
@@ -219,7 +222,10 @@ fn a_slow_client_that_reads_gets_all_of_a_long_message() {
     };
     assert_eq!(whole, (6 << 20) + 13);
     assert!(begin.elapsed() > STALL_TIME, "too fast for this test");
-    assert_eq!((hub.clients(), hub.counts().clients_stalled), (1, 0));
+    assert_eq!(
+        (broadcaster.clients(), broadcaster.counts().clients_stalled),
+        (1, 0)
+    );
     server.finish();
 }
 
@@ -236,23 +242,23 @@ fn half_open(server: &Server, count: usize, said: &[u8]) -> Vec<TcpStream> {
 
 #[test]
 fn half_open_connections_keep_nobody_out() {
-    let gate = || Gate {
+    let auth = || RequestAuth {
         token: Some("secret".to_owned()),
-        ..Gate::default()
+        ..RequestAuth::default()
     };
     let page = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n";
     // Half a request, nothing, another protocol, a request without the token.
     for said in [&b"GET / HT"[..], b"", b"\x16\x03\x01\x02\x00", page] {
-        let (server, hub) = server(16, gate());
+        let (server, broadcaster) = server(16, auth());
         let _crowd = half_open(&server, 200, said);
         // All that there is place for.
         let inside: Vec<_> = (0..16).map(|_| with_token(server.address())).collect();
-        assert_eq!(hub.clients(), 16);
+        assert_eq!(broadcaster.clients(), 16);
         let _more = half_open(&server, 200, said);
         for mut socket in inside {
             assert_eq!(text(&mut socket)["op"], "serverInfo");
         }
-        let counts = hub.counts();
+        let counts = broadcaster.counts();
         assert_eq!(counts.clients_refused, 0);
         let waits = said.len() < 10 && said.first() != Some(&0x16);
         if waits {
@@ -262,7 +268,9 @@ fn half_open_connections_keep_nobody_out() {
                 (1..=most).contains(&counts.connections_displaced),
                 "{counts:?}"
             );
-            until(|| hub.counts().connections_displaced >= 400 - 2 * MAX_CONNECTIONS as u64);
+            until(|| {
+                broadcaster.counts().connections_displaced >= 400 - 2 * MAX_CONNECTIONS as u64
+            });
         }
         server.finish();
     }
@@ -270,11 +278,11 @@ fn half_open_connections_keep_nobody_out() {
 
 #[test]
 fn connections_that_come_again_and_again_keep_nobody_out() {
-    let gate = Gate {
+    let auth = RequestAuth {
         token: Some("secret".to_owned()),
-        ..Gate::default()
+        ..RequestAuth::default()
     };
-    let (server, hub) = server(16, gate);
+    let (server, broadcaster) = server(16, auth);
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -282,7 +290,7 @@ fn connections_that_come_again_and_again_keep_nobody_out() {
                 drop(half_open(&server, 100, b"GET / HT"));
             }
         });
-        until(|| hub.counts().connections_displaced > 100);
+        until(|| broadcaster.counts().connections_displaced > 100);
         let in_time = (0..50).filter(|_| try_with_token(server.address()).is_ok());
         let in_time = in_time.count();
         done.store(true, Relaxed);

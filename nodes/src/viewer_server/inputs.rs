@@ -1,4 +1,4 @@
-//! Messages that clients publish for a headset: counted, and refused by name.
+//! Headset messages from clients: counters and reasons for rejection.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use lattice_runtime::lock;
 use serde::Serialize;
 
-/// A message of a client on a topic of a headset, not yet read.
+/// Undecoded client message on a headset topic.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Input {
-    /// Place of the topic in the offer.
+    /// Index of the topic in the offer.
     pub topic: usize,
     /// True for JSON, false for CDR.
     pub is_json: bool,
@@ -18,27 +18,27 @@ pub struct Input {
     pub bytes: Vec<u8>,
 }
 
-/// Reason for which a message is not taken.
+/// Reason for rejecting a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InputRefusal {
-    /// Longer than messages of headsets may be.
+    /// Message size above the limit.
     TooLong,
-    /// More bytes in a second than a client may send.
+    /// Rate of the client above the limit.
     TooMuch,
-    /// The node has not worked off what came before.
+    /// The node's inbox is full.
     Busy,
     /// Not a message of the topic's type.
     Malformed,
-    /// A part of a mesh that is too long to be sent on, or a mesh of too many parts.
+    /// Mesh chunk above the size limit, or a mesh of too many chunks.
     LongChunk,
-    /// Names of a mesh that are too long to be in each of its parts.
+    /// Mesh names too long to be repeated in each chunk.
     LongNames,
-    /// Nobody took it from the publisher.
+    /// The publisher's queue is full.
     NotSent,
 }
 
 impl InputRefusal {
-    /// Name under which it is counted.
+    /// Counter name.
     pub fn name(self) -> &'static str {
         match self {
             Self::TooLong => "headset_too_long",
@@ -51,34 +51,34 @@ impl InputRefusal {
         }
     }
 
-    /// Word for the client.
+    /// Text for the client.
     pub fn words(self) -> &'static str {
         match self {
             Self::TooLong => "the message is longer than `headset_message_bytes`",
-            Self::TooMuch => "more than `headset_bytes_per_s` come from this client",
-            Self::Busy => "the node has not worked off what came before",
+            Self::TooMuch => "this client exceeds `headset_bytes_per_s`",
+            Self::Busy => "the node's inbox is full",
             Self::Malformed => "not a message of the type of its topic",
             Self::LongChunk => {
                 "a chunk of a mesh has more than 60 kB, or a whole one more than 1000 of them: send it in more surfaces"
             }
             Self::LongNames => "session, surface and frame of a mesh have more than 2 kB",
-            Self::NotSent => "the publisher has no room",
+            Self::NotSent => "the publisher's queue is full",
         }
     }
 }
 
-/// Counters of messages for a headset, also by reason where they were refused.
+/// Counters of headset messages, with rejections by reason.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct InputCounts {
-    /// Messages that were published.
+    /// Messages published.
     pub headset_in: u64,
     /// Their bytes.
     pub headset_bytes_in: u64,
-    /// Those that were not.
+    /// Messages rejected, by reason.
     pub headset_refused: BTreeMap<&'static str, u64>,
 }
 
-/// Messages of clients in the node's inbox: at most half of its places and bytes, so that no client takes the map's.
+/// Client messages in the node's inbox: limited to half of its events and bytes, so that clients cannot displace the map.
 #[derive(Debug)]
 pub struct Waiting {
     max_events: usize,
@@ -88,7 +88,7 @@ pub struct Waiting {
 }
 
 impl Waiting {
-    /// Of an inbox of so many events and bytes.
+    /// Limits for an inbox of `events` and `bytes`.
     pub fn new(events: usize, bytes: usize) -> Self {
         Self {
             max_events: (events / 2).max(1),
@@ -98,7 +98,7 @@ impl Waiting {
         }
     }
 
-    /// Counts a message that is to wait; false if there is no room for it.
+    /// Counts a queued message; false if the limit is reached.
     pub fn enter(&self, bytes: usize) -> bool {
         let add = |to: &AtomicUsize, more: usize, most: usize| {
             let fits = |now: usize| now.checked_add(more).filter(|sum| *sum <= most);
@@ -115,7 +115,7 @@ impl Waiting {
         has_room
     }
 
-    /// Takes a message off that waits no more.
+    /// Counts a message that left the queue.
     pub fn leave(&self, bytes: usize) {
         self.events.fetch_sub(1, Ordering::Relaxed);
         self.bytes.fetch_sub(bytes, Ordering::Relaxed);
@@ -127,14 +127,14 @@ impl Waiting {
 pub struct Inputs(Mutex<InputCounts>);
 
 impl Inputs {
-    /// Counts a message that was published.
+    /// Counts a published message.
     pub fn taken(&self, bytes: usize) {
         let mut counts = lock(&self.0);
         counts.headset_in += 1;
         counts.headset_bytes_in += bytes as u64;
     }
 
-    /// Counts a message that was not.
+    /// Counts a rejected message.
     pub fn refused(&self, refusal: InputRefusal) {
         *lock(&self.0)
             .headset_refused

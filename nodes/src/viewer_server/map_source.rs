@@ -1,6 +1,6 @@
-//! The map of this process: follows the mapper's, and writes keyframes and merged updates for clients.
+//! Map of the viewer: follows the mapper's map, and creates keyframes and merged updates for clients.
 //!
-//! Sequences and epochs are the mapper's. Checksums are of the updates as they are sent from here.
+//! Sequences and epochs are the mapper's. Checksums are computed for the updates sent to clients.
 
 use lattice_core::lattice::MortonKey;
 use lattice_core::voxels::codec;
@@ -15,24 +15,24 @@ use super::thin;
 use crate::convert::map::{History, KEY_ENCODING, VoxelState, sign};
 use crate::map_follower::{FollowError, Followed, FollowedMap, MapFollower};
 
-/// Voxels of a message: some 60 kB with labels.
+/// Voxels per message: some 60 kB with labels.
 const CHUNK_VOXELS: usize = 3000;
 
-/// Difference between the map and what clients have been sent.
+/// Change of the map since the last call.
 #[derive(Debug)]
-pub enum News {
+pub enum MapChange {
     /// None.
-    Nothing,
+    Unchanged,
     /// All of it: it is another map.
-    OtherMap,
-    /// An update, in chunks.
+    Replaced,
+    /// Update chunks.
     Updates(Vec<Entry>),
 }
 
-/// Follows the map, and writes it for clients.
+/// Follows the map and encodes it for clients.
 pub struct MapSource {
     follower: MapFollower,
-    /// State that clients are at.
+    /// State last sent to clients.
     sent: Option<Sent>,
 }
 
@@ -44,7 +44,7 @@ struct Sent {
 }
 
 impl MapSource {
-    /// Follows nothing yet; keeps at most `max_voxels`.
+    /// An empty source that keeps at most `max_voxels`.
     pub fn new(max_voxels: usize) -> Self {
         Self {
             follower: MapFollower::new(max_voxels),
@@ -52,39 +52,39 @@ impl MapSource {
         }
     }
 
-    /// Takes a chunk of a keyframe.
+    /// Handles a keyframe chunk.
     pub fn on_map(&mut self, chunk: &LatticeMap) -> Result<Followed, FollowError> {
         self.follower.on_map(chunk)
     }
 
-    /// Takes a chunk of an update.
+    /// Handles an update chunk.
     pub fn on_update(&mut self, chunk: &LatticeMapUpdate) -> Result<Followed, FollowError> {
         self.follower.on_update(chunk)
     }
 
-    /// To be called once a second; true if a keyframe is to be asked for.
-    pub fn wait_a_second(&mut self) -> bool {
-        self.follower.wait_a_second()
+    /// To be called once a second; true if a keyframe is to be requested.
+    pub fn check_keyframe_timeout(&mut self) -> bool {
+        self.follower.check_keyframe_timeout()
     }
 
-    /// The map as far as it is known.
+    /// The current map.
     pub fn map(&self) -> Option<&FollowedMap> {
         self.follower.map()
     }
 
-    /// Changes that clients do not have; nothing while the map is between two states.
-    pub fn take_news(&mut self) -> Result<News, cdr::CdrError> {
+    /// Changes since the last call; unchanged while an update is incomplete.
+    pub fn take_change(&mut self) -> Result<MapChange, cdr::CdrError> {
         let (Some(map), Some(sequence)) = (self.follower.map(), self.follower.sequence()) else {
-            return Ok(News::Nothing);
+            return Ok(MapChange::Unchanged);
         };
         let epoch = map.info.epoch;
         let known = self.sent.filter(|sent| sent.epoch == epoch);
         if known.is_some_and(|sent| sent.sequence == sequence) {
-            return Ok(News::Nothing);
+            return Ok(MapChange::Unchanged);
         }
         let (touched, replaced) = self.follower.take_touched();
         let Some(map) = self.follower.map() else {
-            return Ok(News::Nothing);
+            return Ok(MapChange::Unchanged);
         };
         let Some(sent) = known.filter(|_| !replaced) else {
             let history = History::default();
@@ -93,7 +93,7 @@ impl MapSource {
                 sequence,
                 history,
             });
-            return Ok(News::OtherMap);
+            return Ok(MapChange::Replaced);
         };
         let mut keys: Vec<MortonKey> = touched.into_iter().collect();
         keys.sort_unstable();
@@ -108,10 +108,10 @@ impl MapSource {
             .into_iter()
             .map(thin::both)
             .collect::<Result<_, _>>()?;
-        Ok(News::Updates(updates))
+        Ok(MapChange::Updates(updates))
     }
 
-    /// A keyframe of the state that clients are at; `None` while there is none, or the map has gone on.
+    /// Keyframe of the state sent to clients; `None` if there is none, or the map is ahead of it.
     pub fn keyframe(&self) -> Result<Option<Vec<Entry>>, cdr::CdrError> {
         let (Some(map), Some(sent)) = (self.follower.map(), self.sent) else {
             return Ok(None);
@@ -135,7 +135,7 @@ fn header(map: &FollowedMap) -> Header {
     }
 }
 
-/// Columns of voxels as messages hold them.
+/// Voxel columns of a message.
 #[derive(Default)]
 struct Columns {
     counts: Vec<u32>,

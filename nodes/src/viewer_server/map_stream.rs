@@ -1,19 +1,19 @@
-//! The map as one stream for all clients: a keyframe, what followed it, and where each client is.
+//! Map stream shared by all clients: a keyframe, the updates after it, and a cursor per client.
 //!
-//! A client holds a place in the stream and no messages, so a slow one costs nothing but its place; one
-//! that falls out of what is kept begins again with a keyframe.
+//! A client has a cursor and no queued messages, so slow clients need no memory. A client more than the kept
+//! updates behind receives a new keyframe.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// A message of the map.
+/// A map message.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
-    /// Time at which it was made, in ns.
+    /// Creation time, ns.
     pub stamp_ns: u64,
     /// CDR.
     pub cdr: Arc<[u8]>,
-    /// CDR of the thin form, where there is one.
+    /// CDR of the thin form, if any.
     pub thin: Option<Arc<[u8]>>,
 }
 
@@ -23,7 +23,7 @@ impl Entry {
         self.cdr.len() + self.thin.as_ref().map_or(0, |thin| thin.len())
     }
 
-    /// The message in its thin form alone.
+    /// The message with its thin form only.
     pub fn thinned(self) -> Self {
         Self {
             cdr: self.thin.unwrap_or(self.cdr),
@@ -33,7 +33,7 @@ impl Entry {
     }
 }
 
-/// Chunks of a keyframe, and the number of the first update that follows it.
+/// Keyframe chunks, and the number of the first update after them.
 #[derive(Clone, Debug)]
 struct Keyframe {
     chunks: Arc<[Entry]>,
@@ -41,35 +41,35 @@ struct Keyframe {
     at: u64,
 }
 
-/// Place of a client in the stream.
+/// Position of a client in the stream.
 #[derive(Clone, Debug, Default)]
 pub enum Cursor {
     /// Before a keyframe.
     #[default]
     Fresh,
-    /// Within one.
+    /// Within a keyframe.
     Keyframe {
-        /// All of it.
+        /// Its chunks.
         chunks: Arc<[Entry]>,
-        /// The next chunk.
+        /// Index of the next chunk.
         next: usize,
-        /// The update after the last.
+        /// Number of the next update after it.
         at: u64,
     },
-    /// Before this update.
+    /// Before the update with this number.
     Updates(u64),
 }
 
-/// The next message for a client.
+/// Next message for a client.
 #[derive(Debug, PartialEq)]
 pub enum Next {
     /// A chunk of a keyframe.
     Map(Entry),
     /// An update.
     Update(Entry),
-    /// None yet.
+    /// No message yet.
     Nothing,
-    /// None until there is a keyframe, which is now wanted.
+    /// No message until there is a keyframe, which is needed.
     Waits,
 }
 
@@ -80,17 +80,17 @@ pub struct MapStream {
     keyframe: Option<Keyframe>,
     updates: VecDeque<Entry>,
     bytes: usize,
-    /// Number of the update that comes next.
+    /// Number of the next update.
     end: u64,
-    /// Times that a client fell out of what is kept.
+    /// Number of times that a client fell behind the kept updates.
     fallen_behind: u64,
 }
 
-/// Updates that a keyframe may be followed by whatever its size.
+/// Bytes of updates that are always kept, even for small keyframes.
 const FEW_BYTES: usize = 256 << 10;
 
 impl MapStream {
-    /// A stream that keeps updates of at most `limit_bytes`.
+    /// Stream that keeps at most `limit_bytes` of updates.
     pub fn new(limit_bytes: usize) -> Self {
         Self {
             limit_bytes,
@@ -123,7 +123,7 @@ impl MapStream {
         }
     }
 
-    /// The keyframe of the state after the last update.
+    /// Sets the keyframe of the state after the last update.
     pub fn set_keyframe(&mut self, chunks: Vec<Entry>) {
         self.keyframe = Some(Keyframe {
             bytes: chunks.iter().map(Entry::bytes).sum(),
@@ -132,16 +132,16 @@ impl MapStream {
         });
     }
 
-    /// Begins with another map: every client needs a keyframe.
+    /// Restarts with another map: every client needs a keyframe.
     pub fn reset(&mut self) {
         self.keyframe = None;
         self.updates.clear();
         self.bytes = 0;
-        // As if one update were lost to all.
+        // Equivalent to an update missed by all.
         self.end += 1;
     }
 
-    /// The next message of a client, whose place moves on.
+    /// Next message of a client; advances its cursor.
     pub fn next(&mut self, cursor: &mut Cursor) -> Next {
         loop {
             match cursor {
@@ -177,22 +177,22 @@ impl MapStream {
         }
     }
 
-    /// Times that a client fell out of what is kept.
+    /// Number of times that a client fell behind the kept updates.
     pub fn fallen_behind(&self) -> u64 {
         self.fallen_behind
     }
 
-    /// Bytes of what is kept.
+    /// Bytes kept.
     pub fn kept_bytes(&self) -> usize {
         self.bytes + self.keyframe.as_ref().map_or(0, |keyframe| keyframe.bytes)
     }
 
-    /// Number of the oldest update that is kept.
+    /// Number of the oldest kept update.
     fn begin(&self) -> u64 {
         self.end - self.updates.len() as u64
     }
 
-    /// The keyframe, if it is not far behind.
+    /// The keyframe, if it is recent enough.
     fn usable_keyframe(&self) -> Option<&Keyframe> {
         let keyframe = self.keyframe.as_ref()?;
         let index = usize::try_from(keyframe.at.checked_sub(self.begin())?).ok()?;

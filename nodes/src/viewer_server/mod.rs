@@ -1,18 +1,18 @@
-//! The viewer server: a page that draws the map, and a Foxglove WebSocket, on one port.
+//! `viewer_server`: a web page with the map, and a Foxglove WebSocket, on one port.
 //!
-//! The node's thread follows the map and offers messages to a [`Hub`]; the server's thread gives each
-//! client what it wants, at the client's pace.
+//! The node's thread follows the map and passes messages to a [`Broadcaster`]; the server's thread sends them to each
+//! client at the client's rate.
 
 mod bridge;
+mod broadcaster;
 mod client;
+mod client_session;
 mod connection;
+mod connection_limit;
 mod counts;
-mod desk;
 mod fixed;
-mod flow;
 mod graph;
 mod http;
-mod hub;
 mod inputs;
 mod map_source;
 mod map_stream;
@@ -22,7 +22,7 @@ mod options;
 mod outbox;
 mod parameters;
 mod protocol;
-mod room;
+mod rate_limit;
 mod server;
 mod sources;
 mod stream;
@@ -30,20 +30,20 @@ mod thin;
 mod watched;
 
 pub use bridge::Bridge;
-pub use counts::HubCounts;
-pub use desk::{Ask, Desk, Step};
+pub use broadcaster::{Broadcaster, Demand};
+pub use client_session::{BridgeRequest, ClientSession, SessionAction};
+pub use counts::BroadcasterCounts;
 pub use fixed::{serve, serve_labelled};
 pub use graph::ConnectionGraph;
-pub use http::{Decision, Gate, Head};
-pub use hub::{Demand, Hub};
+pub use http::{Decision, Head, RequestAuth};
 pub use inputs::{Input, InputCounts, InputRefusal, Inputs};
-pub use map_source::{MapSource, News};
+pub use map_source::{MapChange, MapSource};
 pub use map_stream::{Cursor, Entry, MapStream, Next};
 pub use offer::{Offer, OpenTopic};
 pub use options::{ViewerOptions, url};
 pub use outbox::{Class, Outbox, Outgoing};
 pub use parameters::declare;
-pub use protocol::{AdvertisedService, ClientChannel, SUBPROTOCOLS, Value, Wish};
+pub use protocol::{AdvertisedService, ClientChannel, SUBPROTOCOLS, SubscriptionRequest, Value};
 pub use server::Server;
 
 #[cfg(test)]

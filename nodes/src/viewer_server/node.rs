@@ -1,4 +1,4 @@
-//! The viewer server as a ROS node: subscriptions, the server's thread, and what is between.
+//! ROS node of the viewer: subscriptions, server thread and compute thread.
 
 use std::io::Write;
 use std::sync::Arc;
@@ -10,10 +10,10 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use serde::Serialize;
 
 use super::bridge::{HandOver, HeadsetTopics, NodeBridge};
-use super::counts::HubCounts;
-use super::hub::Hub;
+use super::broadcaster::Broadcaster;
+use super::counts::BroadcasterCounts;
 use super::inputs::{Input, InputCounts, Inputs, Waiting};
-use super::map_source::{MapSource, News};
+use super::map_source::{MapChange, MapSource};
 use super::map_stream::MapStream;
 use super::options::{ViewerOptions, url};
 use super::outbox::Class;
@@ -26,7 +26,7 @@ use crate::report;
 use crate::start::{Finish, NodeError, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Load, Node, Runtime, Undecoded};
+use lattice_runtime::{Diagnostics, Level, Node, Runtime, SubscriptionExecutor, Undecoded};
 
 /// Event for the compute thread.
 enum Event {
@@ -34,7 +34,7 @@ enum Event {
     Update(Undecoded<LatticeMapUpdate>),
     FixedTransforms(Arc<TFMessage>),
     Message(u32, Unwritten),
-    /// Of a client, for a headset's topic.
+    /// Client message for a headset topic.
     Input(u64, Input),
     Tick,
     Finish,
@@ -46,10 +46,10 @@ impl FromChannel for Event {
     }
 }
 
-/// Report of a server at its end.
+/// Report of the viewer.
 #[derive(Serialize)]
 struct ViewerReport {
-    counts: HubCounts,
+    counts: BroadcasterCounts,
     inputs: InputCounts,
     voxels: usize,
     messages_lost: u64,
@@ -65,17 +65,17 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         reach,
         report_file,
     } = Settings::from_params(params)?;
-    let hub = Arc::new(Hub::new(viewer.max_clients));
-    hub.map_channels(&node.resolve("map")?, &node.resolve("map_updates")?);
+    let broadcaster = Arc::new(Broadcaster::new(viewer.max_clients));
+    broadcaster.map_channels(&node.resolve("map")?, &node.resolve("map_updates")?);
     let one = Class::Newest { depth: 1 };
-    let fixed_channel = hub.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
+    let fixed_channel = broadcaster.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
     let inputs = Arc::new(Inputs::default());
     let waiting = Arc::new(Waiting::new(limits.events, limits.bytes));
-    let gate = viewer.gate()?;
+    let auth = viewer.request_auth()?;
     let losses = MapLosses::default();
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         node: node.clone(),
-        hub: Arc::clone(&hub),
+        broadcaster: Arc::clone(&broadcaster),
         source: MapSource::new(viewer.max_voxels),
         parts: None,
         inputs: Arc::clone(&inputs),
@@ -87,30 +87,35 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         seconds: Throttle::new(Duration::from_secs(1)),
         report_file,
     };
-    // Made by the compute thread's handler at its first event.
+    // Received by the compute thread's handler at its first event.
     let (give, take) = crossbeam_channel::bounded(1);
     let compute = Compute::spawn(name, limits, runtime.shutdown_handle(), move |event| {
-        if shell.parts.is_none() {
-            shell.parts = take.recv().ok();
+        if compute_state.parts.is_none() {
+            compute_state.parts = take.recv().ok();
         }
-        shell.on(event)
+        compute_state.on(event)
     })?;
     let inbox = compute.inbox();
     let hand_over = hand_over(&inbox, waiting);
-    let (bridge, headset) = NodeBridge::new(&node, &reach, &hub, (inputs, hand_over))?;
-    hub.set_bridge(Box::new(bridge));
-    let sources = Sources::new(&node, &hub, &viewer, &inbox)?;
+    let (bridge, headset) = NodeBridge::new(&node, &reach, &broadcaster, (inputs, hand_over))?;
+    broadcaster.set_bridge(Box::new(bridge));
+    let sources = Sources::new(&node, &broadcaster, &viewer, &inbox)?;
     let _ = give.send(Parts { sources, headset });
-    // Who listens comes after the channels: the list of them is sent once.
-    let server = Server::start(viewer.address, gate.clone(), Arc::clone(&hub))?;
-    tell_address(&url(server.address(), &gate), gate.token.is_some());
+    // Started after the channels exist: clients receive the channel list once.
+    let server = Server::start(viewer.address, auth.clone(), Arc::clone(&broadcaster))?;
+    tell_address(&url(server.address(), &auth), auth.token.is_some());
     let maps = losses.subscribe(&node, &inbox, Event::Map, Event::Update)?;
     let on_fixed = inbox.counting(
         &losses.at_inbox,
         Event::FixedTransforms,
         |fixed: &Arc<TFMessage>| fixed.transforms.len() * 100,
     );
-    let fixed = node.subscribe("/tf_static", Qos::TF_STATIC_LISTENER, Load::Small, on_fixed)?;
+    let fixed = node.subscribe(
+        "/tf_static",
+        Qos::TF_STATIC_LISTENER,
+        SubscriptionExecutor::Shared,
+        on_fixed,
+    )?;
     let period = |viewer: &ViewerOptions| Duration::from_secs_f64(viewer.update_period_s);
     let ticks = runtime.timer(period(&viewer), move || {
         let _ = inbox.send(Event::Tick, 0);
@@ -128,7 +133,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// Hands messages of clients over to the compute thread.
+/// Sends client messages to the compute thread.
 fn hand_over(inbox: &Inbox<Event>, waiting: Arc<Waiting>) -> HandOver {
     let inbox = inbox.clone();
     Box::new(move |client, input| {
@@ -144,18 +149,20 @@ fn hand_over(inbox: &Inbox<Event>, waiting: Arc<Waiting>) -> HandOver {
     })
 }
 
-/// Parts of the compute thread that are made once it runs.
+/// Parts created on the compute thread.
 struct Parts {
     sources: Sources,
     headset: HeadsetTopics,
 }
 
-/// Says where the page is. A token is for the terminal alone: others read `/rosout` and log files.
+/// Logs the URL of the page. A URL with a token is printed to the terminal only: `/rosout` and log files are public.
 fn tell_address(url: &str, has_token: bool) {
     match has_token {
         true => {
-            log::info!("the address of the map has a token, which the terminal alone is told");
-            // A terminal that is gone is no reason to stop.
+            log::info!(
+                "the address of the map contains a token and is printed to the terminal only"
+            );
+            // A closed terminal is not an error.
             let _ = writeln!(std::io::stderr(), "the map is at {url}");
         }
         false => log::info!("the map is at {url}"),
@@ -163,9 +170,9 @@ fn tell_address(url: &str, has_token: bool) {
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     node: Node,
-    hub: Arc<Hub>,
+    broadcaster: Arc<Broadcaster>,
     source: MapSource,
     parts: Option<Parts>,
     inputs: Arc<Inputs>,
@@ -178,7 +185,7 @@ struct Shell {
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Map(chunk) => {
@@ -191,12 +198,12 @@ impl Shell {
             }
             Event::FixedTransforms(message) => {
                 if let Ok(all) = self.fixed.add(&message) {
-                    self.hub.offer(self.fixed_channel, all);
+                    self.broadcaster.offer(self.fixed_channel, all);
                 }
             }
             Event::Message(channel, message) => match message() {
-                Ok(cdr) => self.hub.offer(channel, cdr),
-                Err(error) => log::debug!("not passed on: {error}"),
+                Ok(cdr) => self.broadcaster.offer(channel, cdr),
+                Err(error) => log::debug!("not forwarded: {error}"),
             },
             Event::Input(client, input) => self.pass(client, &input),
             Event::Tick => self.tick(),
@@ -204,7 +211,7 @@ impl Shell {
         }
     }
 
-    /// Publishes a client's message on its topic, or tells the client why not.
+    /// Publishes a client's message, or notifies the client of the reason for its rejection.
     fn pass(&mut self, client: u64, input: &Input) {
         self.waiting.leave(input.bytes.len());
         let Some(parts) = &self.parts else { return };
@@ -212,7 +219,7 @@ impl Shell {
             Ok(()) => self.inputs.taken(input.bytes.len()),
             Err(refusal) => {
                 self.inputs.refused(refusal);
-                self.hub.refuse(client, refusal);
+                self.broadcaster.refuse(client, refusal);
             }
         }
     }
@@ -220,39 +227,42 @@ impl Shell {
     fn tick(&mut self) {
         self.input.make_good();
         let second = self.seconds.check().is_some();
-        if second && self.source.wait_a_second() {
+        if second && self.source.check_keyframe_timeout() {
             self.input.ask_for_keyframe();
         }
         if let Some(parts) = &mut self.parts {
-            parts.sources.adapt(&self.hub);
+            parts.sources.adapt(&self.broadcaster);
         }
         self.feed();
         if second {
-            if self.hub.graph_wanted() {
-                self.hub.set_graph(self.node.graph().into_iter().collect());
+            if self.broadcaster.graph_wanted() {
+                self.broadcaster
+                    .set_graph(self.node.graph().into_iter().collect());
             }
             self.diagnose();
         }
     }
 
-    /// Gives clients what has changed, and a keyframe where one is wanted.
+    /// Sends map changes to clients, and a keyframe if needed.
     fn feed(&mut self) {
-        match self.source.take_news() {
-            Ok(News::Nothing) => {}
-            Ok(News::OtherMap) => self.hub.change_map(MapStream::reset),
-            Ok(News::Updates(updates)) => self
-                .hub
+        match self.source.take_change() {
+            Ok(MapChange::Unchanged) => {}
+            Ok(MapChange::Replaced) => self.broadcaster.change_map(MapStream::reset),
+            Ok(MapChange::Updates(updates)) => self
+                .broadcaster
                 .change_map(|stream| updates.into_iter().for_each(|update| stream.push(update))),
-            Err(error) => log::warn!("the map was not passed on: {error}"),
+            Err(error) => log::warn!("the map was not sent to clients: {error}"),
         }
-        if !self.hub.keyframe_wanted() {
+        if !self.broadcaster.keyframe_wanted() {
             return;
         }
-        // Not within the lock: it takes a while, and only this thread changes the map.
+        // Outside the lock: encoding takes time, and only this thread changes the map.
         match self.source.keyframe() {
-            Ok(Some(chunks)) => self.hub.change_map(|stream| stream.set_keyframe(chunks)),
+            Ok(Some(chunks)) => self
+                .broadcaster
+                .change_map(|stream| stream.set_keyframe(chunks)),
             Ok(None) => {}
-            Err(error) => log::warn!("the map was not passed on: {error}"),
+            Err(error) => log::warn!("the map was not sent to clients: {error}"),
         }
     }
 
@@ -267,9 +277,9 @@ impl Shell {
     }
 
     fn diagnose(&self) {
-        let clients = self.hub.clients();
+        let clients = self.broadcaster.clients();
         let inputs = self.inputs.counts();
-        let mut values = report::key_values(&self.hub.counts());
+        let mut values = report::key_values(&self.broadcaster.counts());
         values.extend(report::key_values(&inputs));
         values.push(("clients".into(), clients.to_string()));
         values.push(("voxels".into(), self.voxels().to_string()));
@@ -283,7 +293,7 @@ impl Shell {
                 let refused = inputs.headset_refused.iter();
                 let refused = refused.map(|(reason, n)| format!("{n} {reason}"));
                 let refused: Vec<_> = refused.collect();
-                let message = format!("{clients} clients; refused: {}", refused.join(", "));
+                let message = format!("{clients} clients; rejected: {}", refused.join(", "));
                 (Level::Warn, message)
             }
         };
@@ -296,7 +306,7 @@ impl Shell {
             parts.sources.end();
         }
         let report = ViewerReport {
-            counts: self.hub.counts(),
+            counts: self.broadcaster.counts(),
             inputs: self.inputs.counts(),
             voxels: self.voxels(),
             messages_lost: self.messages_lost(),

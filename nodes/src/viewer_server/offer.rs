@@ -1,10 +1,10 @@
-//! All that clients may ask for.
+//! Capabilities offered to clients.
 
 use super::protocol::AdvertisedService;
 
-/// Longest message of a client but on topics that take longer ones, bytes.
+/// Largest client message on topics without their own limit, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 64 << 10;
-/// Operation and channel before a message.
+/// Header before a message: operation and channel.
 pub const MESSAGE_HEAD_BYTES: usize = 5;
 
 /// A topic that clients may publish on.
@@ -14,28 +14,28 @@ pub struct OpenTopic {
     pub name: String,
     /// Type of its messages.
     pub type_name: &'static str,
-    /// Longest message of a topic of a headset, whose messages come without end and are not answered; `None`:
-    /// each message is a question.
+    /// Largest message of a headset topic, which is streamed without replies; `None`:
+    /// each message has a reply.
     pub stream_bytes: Option<usize>,
 }
 
-/// All that clients may ask for besides what is shown.
+/// Capabilities offered to clients, besides channels.
 #[derive(Clone, Debug, Default)]
 pub struct Offer {
     /// Services, by their ids.
     pub services: Vec<AdvertisedService>,
     /// Topics.
     pub topics: Vec<OpenTopic>,
-    /// True if parameters may be read and set.
+    /// True if parameters are accessible.
     pub parameters: bool,
-    /// True if the graph of nodes is known.
+    /// True if the node graph is available.
     pub graph: bool,
-    /// Bytes that a client may send on the topics of a headset each second.
+    /// Rate limit per client on headset topics, bytes per second.
     pub stream_bytes_per_s: usize,
 }
 
 impl Offer {
-    /// Names of what is offered in the protocol.
+    /// Capability names of the protocol.
     pub fn capabilities(&self) -> Vec<&'static str> {
         [
             ("services", !self.services.is_empty()),
@@ -49,7 +49,7 @@ impl Offer {
         .collect()
     }
 
-    /// Longest message that may come from a client.
+    /// Largest client message, bytes.
     pub fn max_message_bytes(&self) -> usize {
         let streams = self.topics.iter().filter_map(|topic| topic.stream_bytes);
         let longest = streams.map(|bytes| bytes.saturating_add(MESSAGE_HEAD_BYTES));

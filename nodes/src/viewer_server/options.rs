@@ -1,30 +1,30 @@
-//! Parameters of the viewer server.
+//! Options of the viewer.
 
 use std::io::Read;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 use lattice_runtime::params::{ParamError, Params};
 
-use super::http::Gate;
+use super::http::RequestAuth;
 
-/// Options of the viewer server.
+/// Options of the viewer.
 #[derive(Clone, Debug)]
 pub struct ViewerOptions {
     /// Address and port to listen on.
     pub address: SocketAddr,
-    /// Names by which this machine may be called, besides `localhost` and addresses.
+    /// Host names of this machine, besides `localhost` and addresses.
     pub allowed_hosts: Vec<String>,
-    /// Origins of pages from elsewhere that may connect.
+    /// Allowed cross-origin pages.
     pub allowed_origins: Vec<String>,
-    /// Secret that clients must know; empty: none on loopback, else a random one.
+    /// Required secret of clients; empty: none on loopback, else a random one.
     pub token: String,
-    /// Most clients at a time.
+    /// Limit of clients.
     pub max_clients: usize,
-    /// Largest map followed.
+    /// Voxel limit of the followed map.
     pub max_voxels: usize,
-    /// Time between two messages of updates to clients, in s.
+    /// Period of map updates to clients, s.
     pub update_period_s: f64,
-    /// Topics of clouds that are shown.
+    /// Topics of displayed clouds.
     pub cloud_topics: Vec<String>,
 }
 
@@ -72,14 +72,14 @@ impl ViewerOptions {
         })
     }
 
-    /// Conditions of entry. Without a token only this machine may; where none is given, one is made.
-    pub fn gate(&self) -> std::io::Result<Gate> {
+    /// Conditions for accepting requests. Without a token only loopback is served; elsewhere a missing token is generated.
+    pub fn request_auth(&self) -> std::io::Result<RequestAuth> {
         let token = match (self.token.is_empty(), self.address.ip().is_loopback()) {
             (false, _) => Some(self.token.clone()),
             (true, true) => None,
             (true, false) => Some(random_token()?),
         };
-        Ok(Gate {
+        Ok(RequestAuth {
             hosts: self.allowed_hosts.clone(),
             origins: self.allowed_origins.clone(),
             token,
@@ -87,19 +87,19 @@ impl ViewerOptions {
     }
 }
 
-/// The address to open in a browser.
-pub fn url(address: SocketAddr, gate: &Gate) -> String {
+/// URL for a browser.
+pub fn url(address: SocketAddr, auth: &RequestAuth) -> String {
     let host = match address.ip().is_unspecified() {
         true => SocketAddr::new(Ipv4Addr::LOCALHOST.into(), address.port()),
         false => address,
     };
-    match &gate.token {
+    match &auth.token {
         Some(token) => format!("http://{host}/?token={token}"),
         None => format!("http://{host}"),
     }
 }
 
-/// 128 random bits of the kernel.
+/// Random token of 128 bits from the kernel.
 fn random_token() -> std::io::Result<String> {
     let mut bytes = [0; 16];
     std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
@@ -113,17 +113,20 @@ mod tests {
     #[test]
     fn other_machines_need_a_token() {
         let mut options = ViewerOptions::default();
-        assert_eq!(options.gate().unwrap().token, None);
+        assert_eq!(options.request_auth().unwrap().token, None);
         assert_eq!(
-            url(options.address, &options.gate().unwrap()),
+            url(options.address, &options.request_auth().unwrap()),
             "http://127.0.0.1:8765"
         );
         options.address.set_ip(Ipv4Addr::UNSPECIFIED.into());
-        let [first, second] = [(), ()].map(|()| options.gate().unwrap());
+        let [first, second] = [(), ()].map(|()| options.request_auth().unwrap());
         assert_eq!(first.token.as_ref().unwrap().len(), 32);
         assert_ne!(first.token, second.token);
         assert!(url(options.address, &first).starts_with("http://127.0.0.1:8765/?token="));
         options.token = "mine".to_owned();
-        assert_eq!(options.gate().unwrap().token.as_deref(), Some("mine"));
+        assert_eq!(
+            options.request_auth().unwrap().token.as_deref(),
+            Some("mine")
+        );
     }
 }

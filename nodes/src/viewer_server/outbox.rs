@@ -1,45 +1,45 @@
-//! Messages that wait for one client: control messages in order, the map by its place in the stream, the newest
-//! messages of everything else.
+//! Queue of one client: control messages in order, the map by a cursor, and the newest
+//! messages of each other channel.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use super::map_stream::{Cursor, Entry, MapStream, Next};
 
-/// Most control messages that wait; a client that lets more come is no client.
+/// Limit of queued control messages; a client above it is closed.
 const MAX_CONTROL: usize = 256;
-/// Most bytes of them. One message always fits, however long.
+/// Limit of queued control bytes. One message always fits, of any length.
 const MAX_CONTROL_BYTES: usize = 8 << 20;
-/// Most bytes that wait on one channel besides the map.
+/// Limit of queued bytes per channel besides the map.
 const MAX_RING_BYTES: usize = 8 << 20;
 
-/// The way in which messages of a channel wait.
+/// Queueing class of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
     /// Keyframes of the map.
     Map,
-    /// Its updates.
+    /// Map updates.
     Updates,
-    /// Keyframes in their thin form.
+    /// Keyframes in thin form.
     ThinMap,
-    /// Updates in their thin form.
+    /// Updates in thin form.
     ThinUpdates,
-    /// The newest few; older ones give way.
+    /// The newest messages; older ones are dropped.
     Newest {
-        /// Messages that wait at most.
+        /// Queue length.
         depth: usize,
     },
 }
 
-/// A message to be sent to a client.
+/// A message to a client.
 #[derive(Debug, PartialEq)]
 pub enum Outgoing {
     /// A control message.
     Text(String),
-    /// A control message that is no text.
+    /// A binary control message.
     Binary(Vec<u8>),
     /// A message of a subscription.
     Data(u32, Entry),
-    /// Nothing more: the client let too many control messages wait.
+    /// Close the connection: too many control messages are queued.
     Close,
 }
 
@@ -54,17 +54,17 @@ impl Outgoing {
     }
 }
 
-/// Messages of one client.
+/// Queue of one client.
 #[derive(Debug, Default)]
 pub struct Outbox {
     control: VecDeque<Outgoing>,
     control_bytes: usize,
     overflown: bool,
-    /// Channel and class by subscription.
+    /// Channel and class by subscription id.
     subscriptions: BTreeMap<u32, (u32, Class)>,
     cursor: Cursor,
     rings: BTreeMap<u32, VecDeque<Entry>>,
-    /// The subscription after which the next turn begins.
+    /// Subscription id of the last turn.
     turn: u32,
     maps_turn: bool,
     waits_for_keyframe: bool,
@@ -72,12 +72,12 @@ pub struct Outbox {
 }
 
 impl Outbox {
-    /// Adds a control message.
+    /// Queues a text control message.
     pub fn control(&mut self, text: String) {
         self.answer(Outgoing::Text(text));
     }
 
-    /// Adds a control message of either kind.
+    /// Queues a control message of either kind.
     pub fn answer(&mut self, message: Outgoing) {
         let bytes = self.control_bytes.saturating_add(message.bytes());
         self.overflown |= self.control.len() >= MAX_CONTROL
@@ -88,14 +88,14 @@ impl Outbox {
         }
     }
 
-    /// Adds a subscription; false if the id or the channel has one.
+    /// Adds a subscription; false if the id or the channel is subscribed already.
     pub fn subscribe(&mut self, id: u32, channel: u32, class: Class) -> bool {
         let taken = self.subscriptions.contains_key(&id) || self.id_of(channel).is_some();
         if taken {
             return false;
         }
         self.subscriptions.insert(id, (channel, class));
-        // Updates that passed while nobody here wanted them are missing.
+        // Updates sent before the subscription are missing.
         let passed = matches!(self.cursor, Cursor::Updates(_));
         match class {
             Class::Map | Class::ThinMap => self.cursor = Cursor::Fresh,
@@ -105,19 +105,19 @@ impl Outbox {
         true
     }
 
-    /// Ends a subscription; gives its channel.
+    /// Removes a subscription; returns its channel.
     pub fn unsubscribe(&mut self, id: u32) -> Option<u32> {
         let (channel, _) = self.subscriptions.remove(&id)?;
         self.rings.remove(&id);
         Some(channel)
     }
 
-    /// Channels that are subscribed to.
+    /// Subscribed channels.
     pub fn channels(&self) -> impl Iterator<Item = u32> + '_ {
         self.subscriptions.values().map(|(channel, _)| *channel)
     }
 
-    /// Offers a message of a channel; true if it now waits here.
+    /// Queues a message of a channel; true if the channel is subscribed.
     pub fn offer(&mut self, channel: u32, message: &Entry) -> bool {
         let Some(id) = self.id_of(channel) else {
             return false;
@@ -136,7 +136,7 @@ impl Outbox {
         true
     }
 
-    /// The next message. Control goes first, then the map and the others take turns.
+    /// Next message: control first, then the map and the other channels in turn.
     pub fn next(&mut self, stream: &mut MapStream) -> Option<Outgoing> {
         if self.overflown {
             self.control.clear();
@@ -153,12 +153,12 @@ impl Outbox {
         }
     }
 
-    /// True if the map goes no further without a keyframe.
+    /// True if the map needs a keyframe to continue.
     pub fn waits_for_keyframe(&self) -> bool {
         self.waits_for_keyframe
     }
 
-    /// Messages that gave way to newer ones.
+    /// Messages dropped for newer ones.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }
@@ -169,7 +169,7 @@ impl Outbox {
             let found = all.find(|(_, (_, other))| *other == class);
             found.map(|(id, _)| *id)
         };
-        // Who wants both forms gets the full one.
+        // With subscriptions to both forms the full one is sent.
         let either = |full: Class, thin: Class| match of(full) {
             Some(id) => Some((id, false)),
             None => of(thin).map(|id| (id, true)),

@@ -1,6 +1,6 @@
-//! All parameters of the viewer server.
+//! Parameters of the viewer.
 
-use super::bridge::{HeadsetReach, Reach};
+use super::bridge::{BridgeOptions, HeadsetLimits};
 use super::offer::MAX_MESSAGE_BYTES;
 use super::options::ViewerOptions;
 use crate::compute::ComputeLimits;
@@ -10,33 +10,33 @@ use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
-    "address" fixed(SOCKET): "Address to listen on. With any but 127.0.0.1 (or ::1) clients need the token.";
-    "port" fixed(SOCKET): "Port of the page and the WebSocket; 0: one that is free.";
-    "token" fixed(SOCKET): "Secret of clients, letters, digits, -, _ and .; empty: none on 127.0.0.1, else a random one, which is in the address that the node tells on standard error alone.";
-    "allowed_hosts" fixed(SOCKET): "Names by which browsers may call this machine, besides localhost and addresses.";
-    "allowed_origins" fixed(SOCKET): "Pages from elsewhere that may connect, such as https://viewer.example.";
-    "max_clients" fixed(SOCKET): "Most clients at a time.";
-    "max_voxels" fixed("the map is followed with it"): "Larger maps are not followed.";
-    "update_period_s": "Time between two messages of map_updates to clients.";
-    "cloud_topics" fixed(TOPIC): "Clouds that clients can have (sensor_msgs/PointCloud2).";
-    "allow_write" fixed(WRITING): "Lets clients clear and save the map, play logs, set parameters and send goals; needs no more than the token.";
-    "allow_headset" fixed(WRITING): "Lets clients publish what a headset sees (headset/mesh, headset/pose and so on) and ask for a calibration; needs no more than the token.";
-    "headset_message_bytes" fixed(WRITING): "Longest such message, bytes.";
-    "headset_bytes_per_s" fixed(WRITING): "Most bytes of such messages that a client may send in a second; what is beyond is refused and counted.";
-    "calibrator" fixed(WRITING): "Node that clients ask for a calibration.";
-    "player" fixed(WRITING): "Node that plays a log.";
+    "address" fixed(SOCKET): "Address to listen on. Any but 127.0.0.1 (or ::1) requires the token.";
+    "port" fixed(SOCKET): "Port of the page and the WebSocket; 0: a free one.";
+    "token" fixed(SOCKET): "Secret of clients, letters, digits, -, _ and .; empty: none on 127.0.0.1, else a random one, in the address printed to standard error only.";
+    "allowed_hosts" fixed(SOCKET): "Host names of this machine for browsers, besides localhost and addresses.";
+    "allowed_origins" fixed(SOCKET): "Allowed cross-origin pages, such as https://viewer.example.";
+    "max_clients" fixed(SOCKET): "Limit of clients.";
+    "max_voxels" fixed("the map is followed with it"): "Voxel limit of the followed map.";
+    "update_period_s": "Period of map updates to clients.";
+    "cloud_topics" fixed(TOPIC): "Topics of clouds available to clients (sensor_msgs/PointCloud2).";
+    "allow_write" fixed(WRITING): "Whether clients may clear and save the map, play logs, set parameters and send goals; requires no more than the token.";
+    "allow_headset" fixed(WRITING): "Whether clients may publish headset topics (headset/mesh, headset/pose and so on) and request a calibration; requires no more than the token.";
+    "headset_message_bytes" fixed(WRITING): "Largest such message, bytes.";
+    "headset_bytes_per_s" fixed(WRITING): "Rate limit of such messages per client; excess messages are rejected and counted.";
+    "calibrator" fixed(WRITING): "Node for calibration requests of clients.";
+    "player" fixed(WRITING): "Node of the bag player.";
     "parameter_nodes" fixed(WRITING): "Nodes whose parameters clients may set.";
-    "goal_topic" fixed(WRITING): "Topic of goals of clients (geometry_msgs/PoseStamped).";
+    "goal_topic" fixed(WRITING): "Topic of goals from clients (geometry_msgs/PoseStamped).";
 };
 
 const WRITING: &str = "what clients may do is settled at the start";
 const SOCKET: &str = "the server is made with it";
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub viewer: ViewerOptions,
     pub limits: ComputeLimits,
-    pub reach: Reach,
+    pub reach: BridgeOptions,
     pub report_file: String,
 }
 
@@ -52,7 +52,7 @@ impl Settings {
                 bytes: options::inbox_bytes(params, 64 << 20)?,
                 threads: options::threads(params, 1)?,
             },
-            reach: Reach {
+            reach: BridgeOptions {
                 allow_write: params.bool("allow_write", false)?,
                 mapper: params.string("mapper", "lattice_mapper")?,
                 player: params.string("player", "bag_player")?,
@@ -65,8 +65,8 @@ impl Settings {
     }
 }
 
-/// Bounds of what clients may publish for a headset, if they may.
-fn headset(params: &Params) -> Result<Option<HeadsetReach>, ParamError> {
+/// Limits of headset messages from clients, if allowed.
+fn headset(params: &Params) -> Result<Option<HeadsetLimits>, ParamError> {
     let allow = params.bool("allow_headset", false)?;
     let message_bytes = params.usize_in(
         "headset_message_bytes",
@@ -79,14 +79,14 @@ fn headset(params: &Params) -> Result<Option<HeadsetReach>, ParamError> {
         return Err(params.invalid("headset_bytes_per_s", problem));
     }
     let calibrator = params.string("calibrator", "semantic_icp_server")?;
-    Ok(allow.then_some(HeadsetReach {
+    Ok(allow.then_some(HeadsetLimits {
         message_bytes,
         bytes_per_s,
         calibrator,
     }))
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

@@ -23,7 +23,7 @@ use crate::map_follower::{Followed, MapFollower};
 struct Growing {
     mapper: LatticeMapper,
     source: MapSource,
-    hub: Arc<Hub>,
+    broadcaster: Arc<Broadcaster>,
     server: Server,
     step: usize,
     sequence: u64,
@@ -33,11 +33,12 @@ impl Growing {
     fn new() -> Self {
         let lattice = Lattice::new(LatticeKind::Cubic, 0.001).unwrap();
         let mut mapper = LatticeMapper::new(MapperOptions::new(lattice), 7).unwrap();
-        let hub = Arc::new(Hub::new(4));
-        hub.channel::<LatticeMap>("/map", Class::Map, false);
-        hub.channel::<LatticeMapUpdate>("/map_updates", Class::Updates, false);
+        let broadcaster = Arc::new(Broadcaster::new(4));
+        broadcaster.channel::<LatticeMap>("/map", Class::Map, false);
+        broadcaster.channel::<LatticeMapUpdate>("/map_updates", Class::Updates, false);
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let server = Server::start(address, Gate::default(), Arc::clone(&hub)).unwrap();
+        let server =
+            Server::start(address, RequestAuth::default(), Arc::clone(&broadcaster)).unwrap();
         let mut source = MapSource::new(2_000_000);
         mapper
             .keyframe()
@@ -46,7 +47,7 @@ impl Growing {
         Self {
             mapper,
             source,
-            hub,
+            broadcaster,
             server,
             step: 0,
             sequence: 0,
@@ -76,17 +77,18 @@ impl Growing {
 
     /// As the node does at each tick.
     fn feed(&mut self) {
-        match self.source.take_news().unwrap() {
-            News::Nothing => {}
-            News::OtherMap => self.hub.change_map(MapStream::reset),
-            News::Updates(updates) => self
-                .hub
+        match self.source.take_change().unwrap() {
+            MapChange::Unchanged => {}
+            MapChange::Replaced => self.broadcaster.change_map(MapStream::reset),
+            MapChange::Updates(updates) => self
+                .broadcaster
                 .change_map(|stream| updates.into_iter().for_each(|update| stream.push(update))),
         }
-        if self.hub.keyframe_wanted()
+        if self.broadcaster.keyframe_wanted()
             && let Some(chunks) = self.source.keyframe().unwrap()
         {
-            self.hub.change_map(|stream| stream.set_keyframe(chunks));
+            self.broadcaster
+                .change_map(|stream| stream.set_keyframe(chunks));
         }
     }
 }
@@ -177,19 +179,19 @@ fn a_client_that_pauses_hurts_nobody_and_has_the_map_in_the_end() {
         gap_s = gap_s.max(last.elapsed().as_secs_f64());
         last = Instant::now();
         growing
-            .hub
+            .broadcaster
             .change_map(|stream| most_bytes = most_bytes.max(stream.kept_bytes()));
         let due = begun + Duration::from_millis(step * period_ms);
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
     }
-    assert!(by_hand || growing.hub.clients() == 2);
+    assert!(by_hand || growing.broadcaster.clients() == 2);
     let paused = Instant::now();
     pauses.follow(&mut growing);
     let map = growing.mapper.list().sorted();
     let map: Vec<u64> = map.iter().map(|(key, _)| key.raw()).collect();
     assert!(reads.keys() == map && pauses.keys() == map, "other keys");
     // What it missed is no longer kept: it began again.
-    assert!(by_hand || growing.hub.counts().maps_restarted == 1);
+    assert!(by_hand || growing.broadcaster.counts().maps_restarted == 1);
     assert!(
         most_bytes < (8 << 20) + 12 * map.len() + 100_000,
         "{most_bytes} bytes"

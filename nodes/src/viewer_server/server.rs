@@ -1,4 +1,4 @@
-//! The thread that takes connections, and its end.
+//! Server thread: accepts connections until it is finished.
 
 use std::io;
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
@@ -11,24 +11,28 @@ use lattice_runtime::logging::Throttle;
 use smol::channel::{Sender, bounded};
 use smol::{Async, LocalExecutor, Timer};
 
-use super::connection::{self, Rooms};
-use super::http::Gate;
-use super::hub::Hub;
+use super::broadcaster::Broadcaster;
+use super::connection::{self, ConnectionLimits};
+use super::http::RequestAuth;
 
-/// Time for clients to take the last messages.
+/// Time for clients to read the last messages.
 const LAST_TIME: Duration = Duration::from_secs(1);
 
-/// A server that is at work.
+/// A running server.
 pub struct Server {
-    hub: Arc<Hub>,
+    broadcaster: Arc<Broadcaster>,
     address: SocketAddr,
     stop: Sender<()>,
     thread: JoinHandle<()>,
 }
 
 impl Server {
-    /// Listens on an address; one that is taken is an error that says so.
-    pub fn start(address: SocketAddr, gate: Gate, hub: Arc<Hub>) -> io::Result<Self> {
+    /// Listens on an address.
+    pub fn start(
+        address: SocketAddr,
+        auth: RequestAuth,
+        broadcaster: Arc<Broadcaster>,
+    ) -> io::Result<Self> {
         let taken = |error: io::Error| {
             io::Error::new(
                 error.kind(),
@@ -41,12 +45,12 @@ impl Server {
         let address = listener.local_addr()?;
         let listener = Async::new(listener)?;
         let (stop, stopped) = bounded::<()>(1);
-        let served = Arc::clone(&hub);
+        let served = Arc::clone(&broadcaster);
         let thread = std::thread::Builder::new()
             .name("viewer".to_owned())
             .spawn(move || {
                 let executor = LocalExecutor::new();
-                let accept = accept(&executor, listener, Arc::new(gate), hub);
+                let accept = accept(&executor, listener, Arc::new(auth), broadcaster);
                 let ended = async {
                     // Ends when the sender closes.
                     let _ = stopped.recv().await;
@@ -54,22 +58,22 @@ impl Server {
                 smol::block_on(executor.run(smol::future::or(accept, ended)));
             })?;
         Ok(Self {
-            hub: served,
+            broadcaster: served,
             address,
             stop,
             thread,
         })
     }
 
-    /// Address it listens on.
+    /// Listening address.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Lets clients take what there is, for a second at most, and closes all connections.
+    /// Lets clients read queued messages, for at most a second, and closes all connections.
     pub fn finish(self) {
         let late = Instant::now() + LAST_TIME;
-        while !self.hub.is_drained() && Instant::now() < late {
+        while !self.broadcaster.is_drained() && Instant::now() < late {
             std::thread::sleep(Duration::from_millis(10));
         }
         self.stop.close();
@@ -82,27 +86,33 @@ impl Server {
 async fn accept(
     executor: &LocalExecutor<'_>,
     listener: Async<TcpListener>,
-    gate: Arc<Gate>,
-    hub: Arc<Hub>,
+    auth: Arc<RequestAuth>,
+    broadcaster: Arc<Broadcaster>,
 ) {
-    let rooms = Rc::new(Rooms::default());
+    let limits = Rc::new(ConnectionLimits::default());
     let warnings = Throttle::new(Duration::from_secs(5));
     loop {
         let (stream, from) = match accepted(&listener).await {
             Ok(stream) => stream,
             Err(error) => {
-                // As when there are no descriptors: it may pass.
+                // Such as a lack of descriptors, which may pass.
                 if let Some(more) = warnings.check() {
-                    log::warn!("a connection was not taken: {error} ({more} more like it)");
+                    log::warn!("connection not accepted: {error} ({more} more like it)");
                 }
                 Timer::after(Duration::from_millis(100)).await;
                 continue;
             }
         };
-        let (gate, hub, rooms) = (Arc::clone(&gate), Arc::clone(&hub), Rc::clone(&rooms));
+        let (auth, broadcaster, limits) = (
+            Arc::clone(&auth),
+            Arc::clone(&broadcaster),
+            Rc::clone(&limits),
+        );
         executor
             .spawn(async move {
-                if let Err(error) = connection::serve(stream, from, gate, hub, &rooms).await {
+                if let Err(error) =
+                    connection::serve(stream, from, auth, broadcaster, &limits).await
+                {
                     log::debug!("a connection ended: {error}");
                 }
             })

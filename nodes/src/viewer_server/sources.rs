@@ -1,4 +1,4 @@
-//! Topics besides the map, and their subscriptions, which are there while somebody wants them.
+//! Topics besides the map, subscribed to on demand.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,22 +15,22 @@ use lattice_msgs::vision_msgs::LabelInfo;
 use lattice_msgs::visualization_msgs::MarkerArray;
 use lattice_msgs::{RosMessage, cdr};
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Load, Node, RuntimeError, Subscription};
+use lattice_runtime::{Node, RuntimeError, Subscription, SubscriptionExecutor};
 
-use super::hub::{Demand, Hub};
+use super::broadcaster::{Broadcaster, Demand};
 use super::options::ViewerOptions;
 use super::outbox::Class;
 use crate::compute::Inbox;
 
-/// Longest message that is passed on.
+/// Largest forwarded message, bytes.
 const MAX_MESSAGE_BYTES: usize = 8 << 20;
-/// Most frames whose fixed transforms are kept.
+/// Limit of frames with stored static transforms.
 const MAX_STATIC_FRAMES: usize = 10_000;
 
-/// A message of a channel that is not yet in CDR.
+/// Channel message before its serialization.
 pub type Unwritten = Box<dyn FnOnce() -> Result<Vec<u8>, CdrError> + Send>;
 
-/// Makes the subscription of a channel.
+/// Creates the subscription of a channel.
 type Subscribe = Box<dyn Fn() -> Result<Subscription, RuntimeError> + Send>;
 
 /// Event for the compute thread.
@@ -39,14 +39,14 @@ pub trait FromChannel: Send + 'static {
     fn message(channel: u32, message: Unwritten) -> Self;
 }
 
-/// Time of a subscription to a channel.
+/// Subscription policy of a channel.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum When {
-    /// Always: it is small, and who comes late must have it.
+    /// Always: small messages that late joiners need.
     Always,
-    /// While somebody wants it.
-    Wanted,
-    /// The same, anew for each who comes: the publisher then sends all that there is again.
+    /// While a client subscribes.
+    OnDemand,
+    /// Renewed for each client, so that the publisher sends its latched messages again.
     EachAnew,
 }
 
@@ -58,17 +58,17 @@ struct Source {
     joined: u64,
 }
 
-/// The topics besides the map.
+/// Topics besides the map.
 pub struct Sources {
     sources: Vec<Source>,
-    /// Messages that found the inbox full or were too long.
+    /// Messages rejected by the inbox, or too long.
     pub lost: Arc<AtomicU64>,
 }
 
-/// Adds sources to a hub.
+/// Adds sources to a broadcaster.
 struct Builder<'a, E> {
     node: &'a Node,
-    hub: &'a Hub,
+    broadcaster: &'a Broadcaster,
     inbox: &'a Inbox<E>,
     sources: Sources,
 }
@@ -77,13 +77,15 @@ impl<E: FromChannel> Builder<'_, E> {
     fn add<M: RosMessage>(
         &mut self,
         topic: &str,
-        (qos, load): (Qos, Load),
+        (qos, executor): (Qos, SubscriptionExecutor),
         depth: usize,
         when: When,
     ) -> Result<(), RuntimeError> {
         let kept = when != When::EachAnew && qos.durability == Qos::LATCHED.durability;
         let full = self.node.resolve(topic)?;
-        let channel = self.hub.channel::<M>(&full, Class::Newest { depth }, kept);
+        let channel = self
+            .broadcaster
+            .channel::<M>(&full, Class::Newest { depth }, kept);
         let (node, inbox) = (self.node.clone(), self.inbox.clone());
         let (topic, lost) = (topic.to_owned(), Arc::clone(&self.sources.lost));
         self.sources.sources.push(Source {
@@ -91,7 +93,7 @@ impl<E: FromChannel> Builder<'_, E> {
             when,
             subscribe: Box::new(move || {
                 let (inbox, lost) = (inbox.clone(), Arc::clone(&lost));
-                node.subscribe_undecoded::<M>(&topic, qos, load, move |message| {
+                node.subscribe_undecoded::<M>(&topic, qos, executor, move |message| {
                     let bytes = message.bytes(|_| 4096);
                     let event = E::message(channel, Box::new(move || message.into_cdr()));
                     let fits = bytes <= MAX_MESSAGE_BYTES && inbox.send(event, bytes);
@@ -106,10 +108,10 @@ impl<E: FromChannel> Builder<'_, E> {
 }
 
 impl Sources {
-    /// Adds the channels of all topics to a hub.
+    /// Adds the channels of all topics to a broadcaster.
     pub fn new<E: FromChannel>(
         node: &Node,
-        hub: &Hub,
+        broadcaster: &Broadcaster,
         options: &ViewerOptions,
         inbox: &Inbox<E>,
     ) -> Result<Self, RuntimeError> {
@@ -119,34 +121,39 @@ impl Sources {
         };
         let mut builder = Builder {
             node,
-            hub,
+            broadcaster,
             inbox,
             sources,
         };
-        let small = |qos| (qos, Load::Small);
-        let large = |qos| (qos, Load::Large);
-        builder.add::<TFMessage>("/tf", small(Qos::TF), 100, When::Always)?;
+        let shared = |qos| (qos, SubscriptionExecutor::Shared);
+        let dedicated = |qos| (qos, SubscriptionExecutor::Dedicated);
+        builder.add::<TFMessage>("/tf", shared(Qos::TF), 100, When::Always)?;
         builder.add::<DiagnosticArray>(
             "/diagnostics",
-            small(Qos::DIAGNOSTICS),
+            shared(Qos::DIAGNOSTICS),
             20,
             When::Always,
         )?;
-        builder.add::<CalibrationResult>("calibration", small(Qos::LATCHED), 1, When::Always)?;
-        builder.add::<LabelInfo>("label_info", small(Qos::LATCHED), 1, When::Always)?;
-        builder.add::<PointCloud2>("map_centers", large(Qos::MARKERS), 1, When::Wanted)?;
-        builder.add::<MarkerArray>("voxel_markers", large(Qos::MARKERS), 1000, When::EachAnew)?;
-        builder.add::<LatticeMap>("free", large(Qos::MAP), 1000, When::EachAnew)?;
+        builder.add::<CalibrationResult>("calibration", shared(Qos::LATCHED), 1, When::Always)?;
+        builder.add::<LabelInfo>("label_info", shared(Qos::LATCHED), 1, When::Always)?;
+        builder.add::<PointCloud2>("map_centers", dedicated(Qos::MARKERS), 1, When::OnDemand)?;
+        builder.add::<MarkerArray>(
+            "voxel_markers",
+            dedicated(Qos::MARKERS),
+            1000,
+            When::EachAnew,
+        )?;
+        builder.add::<LatticeMap>("free", dedicated(Qos::MAP), 1000, When::EachAnew)?;
         for topic in &options.cloud_topics {
-            builder.add::<PointCloud2>(topic, large(Qos::SCANS), 20, When::Wanted)?;
+            builder.add::<PointCloud2>(topic, dedicated(Qos::SCANS), 20, When::OnDemand)?;
         }
         Ok(builder.sources)
     }
 
-    /// Makes and ends subscriptions as clients want them.
-    pub fn adapt(&mut self, hub: &Hub) {
+    /// Creates and drops subscriptions by demand.
+    pub fn adapt(&mut self, broadcaster: &Broadcaster) {
         for source in &mut self.sources {
-            let Demand { clients, joined } = hub.demand(source.channel);
+            let Demand { clients, joined } = broadcaster.demand(source.channel);
             let wanted = clients > 0 || source.when == When::Always;
             let anew = source.when == When::EachAnew && joined != source.joined;
             if !wanted || anew {
@@ -168,12 +175,12 @@ impl Sources {
     }
 }
 
-/// All fixed transforms, of whatever publisher, as one message.
+/// Static transforms of all publishers as one message.
 #[derive(Default)]
 pub struct FixedTransforms(BTreeMap<String, TransformStamped>);
 
 impl FixedTransforms {
-    /// Adds those of a message; gives the message of all.
+    /// Adds the transforms of a message; returns the merged message.
     pub fn add(&mut self, message: &TFMessage) -> Result<Vec<u8>, CdrError> {
         for transform in &message.transforms {
             let child = &transform.child_frame_id;

@@ -1,4 +1,4 @@
-//! Stream of one client: notes when the client last took something, and reads in turns.
+//! Client stream: records the client's last progress, and yields between reads.
 
 use std::cell::Cell;
 use std::io;
@@ -12,18 +12,18 @@ use futures::{AsyncRead, AsyncWrite};
 use smol::future::or;
 use smol::{Async, Timer};
 
-/// A client that takes nothing for so long is closed.
+/// Time without progress after which a client is closed.
 pub const STALL_TIME: Duration = Duration::from_secs(20);
-/// Reads after which the other connections of the thread get their turn: 2 MB of the 128 KiB that a WebSocket
-/// reads at a time. Frames without content are read on and on within one poll.
+/// Reads before the thread's other connections have a turn: 2 MB in WebSocket reads
+/// of 128 KiB. Empty frames are read in a loop within one poll.
 const READS_PER_TURN: u32 = 16;
 
-/// Time at which a client last took something.
+/// Time of the client's last progress.
 #[derive(Clone)]
 pub struct Progress(Rc<Cell<Instant>>);
 
 impl Progress {
-    /// Completes the sending of something.
+    /// Completes a send operation.
     ///
     /// # Errors
     /// [`io::ErrorKind::TimedOut`] once the client has taken nothing for [`STALL_TIME`].

@@ -14,7 +14,7 @@ use lattice_msgs::std_msgs::Empty;
 use lattice_msgs::tf2_msgs::TFMessage;
 use proptest::prelude::*;
 
-use super::hub::entry;
+use super::broadcaster::entry;
 use super::*;
 
 /// A state of a map: a number that updates raise by one.
@@ -87,13 +87,16 @@ proptest! {
     }
 }
 
-pub(super) fn server(max_clients: usize, gate: Gate) -> (Server, Arc<Hub>) {
-    let hub = Arc::new(Hub::new(max_clients));
-    hub.channel::<LatticeMap>("/map", Class::Map, false);
-    hub.channel::<TFMessage>("/tf", Class::Newest { depth: 2 }, false);
-    hub.channel::<TFMessage>("/tf_static", Class::Newest { depth: 1 }, true);
+pub(super) fn server(max_clients: usize, auth: RequestAuth) -> (Server, Arc<Broadcaster>) {
+    let broadcaster = Arc::new(Broadcaster::new(max_clients));
+    broadcaster.channel::<LatticeMap>("/map", Class::Map, false);
+    broadcaster.channel::<TFMessage>("/tf", Class::Newest { depth: 2 }, false);
+    broadcaster.channel::<TFMessage>("/tf_static", Class::Newest { depth: 1 }, true);
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    (Server::start(address, gate, Arc::clone(&hub)).unwrap(), hub)
+    (
+        Server::start(address, auth, Arc::clone(&broadcaster)).unwrap(),
+        broadcaster,
+    )
 }
 
 /// The code of the answer to some bytes.
@@ -143,8 +146,8 @@ pub(super) fn data(socket: &mut WebSocket<TcpStream>) -> (u32, Vec<u8>) {
 
 #[test]
 fn a_client_gets_what_it_subscribes_to_and_late_ones_what_is_kept() {
-    let (server, hub) = server(4, Gate::default());
-    hub.offer(2, cdr::to_vec(&TFMessage::default()).unwrap());
+    let (server, broadcaster) = server(4, RequestAuth::default());
+    broadcaster.offer(2, cdr::to_vec(&TFMessage::default()).unwrap());
     let map = LatticeMap {
         voxels_total: 7,
         ..LatticeMap::default()
@@ -159,7 +162,7 @@ fn a_client_gets_what_it_subscribes_to_and_late_ones_what_is_kept() {
             r#"{"op":"subscribe","subscriptions":[{"id":5,"channelId":0},{"id":6,"channelId":2}]}"#;
         socket.send(Message::Text(wish.into())).unwrap();
         assert_eq!(data(&mut socket).0, 6, "the fixed transforms are kept");
-        hub.change_map(|stream| {
+        broadcaster.change_map(|stream| {
             stream.reset();
             stream.set_keyframe(vec![entry(cdr::to_vec(&map).unwrap())]);
         });
@@ -173,23 +176,23 @@ fn a_client_gets_what_it_subscribes_to_and_late_ones_what_is_kept() {
         socket.send(Message::Binary(vec![1; 20].into())).unwrap();
         assert_eq!(text(&mut socket)["level"], 1);
         // The next one has to wait for its map, too.
-        hub.change_map(MapStream::reset);
+        broadcaster.change_map(MapStream::reset);
     }
     server.finish();
 }
 
 #[test]
 fn strangers_and_one_client_too_many_are_refused() {
-    let gate = Gate {
+    let auth = RequestAuth {
         token: Some("secret".to_owned()),
-        ..Gate::default()
+        ..RequestAuth::default()
     };
-    let (guarded, _) = server(1, gate);
+    let (protected, _) = server(1, auth);
     assert_eq!(
-        answer(&guarded, b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+        answer(&protected, b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"),
         "401"
     );
-    let (server, hub) = server(16, Gate::default());
+    let (server, broadcaster) = server(16, RequestAuth::default());
     for (request, code) in [
         ("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n", "200"),
         ("GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", "421"),
@@ -208,7 +211,10 @@ fn strangers_and_one_client_too_many_are_refused() {
         .collect();
     let refused = connect(&server, SUBPROTOCOLS[0]).unwrap_err();
     assert!(refused.contains("503"), "{refused}");
-    assert_eq!((hub.clients(), hub.counts().clients_refused), (16, 1));
+    assert_eq!(
+        (broadcaster.clients(), broadcaster.counts().clients_refused),
+        (16, 1)
+    );
     // A message that is too long ends its connection alone.
     let (socket, _) = &mut inside[0];
     socket
@@ -220,13 +226,13 @@ fn strangers_and_one_client_too_many_are_refused() {
     ) {}
     assert_eq!(text(&mut inside[1].0)["op"], "serverInfo");
     server.finish();
-    guarded.finish();
+    protected.finish();
 }
 
 #[test]
 fn a_taken_port_is_one_clear_line() {
-    let (server, hub) = server(1, Gate::default());
-    let Err(error) = Server::start(server.address(), Gate::default(), hub) else {
+    let (server, broadcaster) = server(1, RequestAuth::default());
+    let Err(error) = Server::start(server.address(), RequestAuth::default(), broadcaster) else {
         panic!("two servers on one port");
     };
     let error = error.to_string();
@@ -264,37 +270,37 @@ fn newest_messages_give_way_and_control_is_bounded() {
 
 #[test]
 fn messages_to_clients_are_counted_and_those_that_give_way_too() {
-    let hub = Hub::new(2);
-    let channel = hub.channel::<Empty>("/newest", Class::Newest { depth: 2 }, false);
-    let (id, _woken) = hub.enter().unwrap();
-    hub.subscribe(id, 1, channel);
+    let broadcaster = Broadcaster::new(2);
+    let channel = broadcaster.channel::<Empty>("/newest", Class::Newest { depth: 2 }, false);
+    let (id, _woken) = broadcaster.enter().unwrap();
+    broadcaster.subscribe(id, 1, channel);
     for _ in 0..5 {
-        hub.offer(channel, vec![0; 100]);
+        broadcaster.offer(channel, vec![0; 100]);
     }
     // What the server is, what it has, and the last two.
-    assert_eq!(std::iter::from_fn(|| hub.next(id)).count(), 4);
-    let counts = hub.counts();
+    assert_eq!(std::iter::from_fn(|| broadcaster.next(id)).count(), 4);
+    let counts = broadcaster.counts();
     assert_eq!((counts.messages_out, counts.bytes_out), (4, 200));
     assert_eq!(counts.messages_dropped, 3);
-    hub.leave(id);
-    assert_eq!(hub.counts().messages_dropped, 3);
+    broadcaster.leave(id);
+    assert_eq!(broadcaster.counts().messages_dropped, 3);
 }
 
 #[test]
 fn a_client_that_is_often_refused_silences_no_other() {
-    let hub = Hub::new(2);
-    let [(noisy, _noisy), (other, _other)] = [(); 2].map(|()| hub.enter().unwrap());
+    let broadcaster = Broadcaster::new(2);
+    let [(noisy, _noisy), (other, _other)] = [(); 2].map(|()| broadcaster.enter().unwrap());
     let told = |id: u64| {
-        let waiting = std::iter::from_fn(|| hub.next(id));
+        let waiting = std::iter::from_fn(|| broadcaster.next(id));
         let words =
             |message: &Outgoing| matches!(message, Outgoing::Text(text) if text.contains("status"));
         waiting.filter(words).count()
     };
     for _ in 0..100 {
-        hub.refuse(noisy, InputRefusal::Busy);
+        broadcaster.refuse(noisy, InputRefusal::Busy);
     }
-    hub.refuse(other, InputRefusal::Malformed);
+    broadcaster.refuse(other, InputRefusal::Malformed);
     assert_eq!((told(noisy), told(other)), (1, 1));
-    hub.refuse(other, InputRefusal::Malformed);
+    broadcaster.refuse(other, InputRefusal::Malformed);
     assert_eq!(told(other), 0, "a word a second");
 }

@@ -1,23 +1,23 @@
-//! The map for thin links: keys and counts alone, both as LEB128, some two bytes a voxel.
+//! Thin form of the map for slow links: keys and counts only, both as LEB128, some two bytes a voxel.
 
 use lattice_core::voxels::codec;
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 
-use super::hub::entry;
+use super::broadcaster::entry;
 use super::map_stream::Entry;
 
-/// Name of the encoding: `keys` holds the keys as ever, then the counts in the same order as LEB128.
+/// Name of the encoding: `keys` contains the Morton keys, then the counts in the same order as LEB128.
 pub const ENCODING: &str = "morton21_delta_leb128_counts_leb128";
 
-/// A message of the map that has a thin form.
+/// A map message with a thin form.
 pub trait Thin: RosMessage {
-    /// The same cells with their counts and nothing else.
+    /// The same cells with counts only.
     fn thin(self) -> Self;
 }
 
-/// The message for clients, in both forms.
+/// Stream entry of a message, in both forms.
 pub fn both<M: Thin>(chunk: M) -> Result<Entry, CdrError> {
     let full = entry(cdr::to_vec(&chunk)?);
     Ok(Entry {

@@ -1,20 +1,20 @@
-//! The parameters of which a client hears when they change.
+//! Parameters watched by a client.
 
 use std::collections::BTreeMap;
 
-/// Most bytes of names that are kept for a client.
+/// Limit of name bytes per client.
 const MAX_NAME_BYTES: usize = 64 << 10;
 
-/// Names, or all, that a client has asked for.
+/// Watched names, or all.
 #[derive(Debug, Default)]
 pub struct Watched {
-    /// True if others than those named are watched.
+    /// True if all parameters except the named ones are watched.
     others: bool,
     named: BTreeMap<String, bool>,
 }
 
 impl Watched {
-    /// Watches these, all if none are named, or does no longer; false if that is too much to keep.
+    /// Starts or stops watching these names (none: all); false above the limit.
     pub fn change(&mut self, names: Vec<String>, watch: bool) -> bool {
         if names.is_empty() {
             self.named.clear();
@@ -34,7 +34,7 @@ impl Watched {
         fits
     }
 
-    /// True if the client wants to hear of this parameter.
+    /// True if the parameter is watched.
     pub fn wants(&self, name: &str) -> bool {
         self.named.get(name).copied().unwrap_or(self.others)
     }

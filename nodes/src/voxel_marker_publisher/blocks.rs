@@ -1,13 +1,13 @@
-//! Voxels by block, and the marker ids of each block.
+//! Voxel blocks, and the marker ids of each block.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use lattice_core::lattice::{LatticeIndex, MortonKey};
 
-/// A cube of lattice indices: the leading bits of its voxels' keys.
+/// Cube of lattice indices: the leading bits of its voxels' keys.
 pub type BlockId = u64;
 
-/// Marker ids of a block after a change of their number.
+/// Marker ids of a block after a change of its markers.
 pub struct Ids {
     pub current: Vec<i32>,
     pub stale: Vec<i32>,
@@ -19,7 +19,7 @@ struct Block {
     ids: Vec<i32>,
 }
 
-/// The occupied voxels by block.
+/// Occupied voxels by block.
 pub struct Blocks {
     shift: u32,
     blocks: BTreeMap<BlockId, Block>,
@@ -28,7 +28,7 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// Blocks of `2^bits` indices a side.
+    /// Creates blocks of `2^bits` indices a side.
     pub fn new(bits: u32) -> Self {
         Self {
             shift: 3 * bits.min(20),
@@ -38,12 +38,12 @@ impl Blocks {
         }
     }
 
-    /// The block of a voxel.
+    /// Block of a voxel.
     pub fn id_of(&self, key: MortonKey) -> BlockId {
         key.raw() >> self.shift
     }
 
-    /// All blocks that hold voxels or still have markers.
+    /// All blocks with voxels or markers.
     pub fn ids(&self) -> impl Iterator<Item = BlockId> + '_ {
         self.blocks.keys().copied()
     }
@@ -62,7 +62,7 @@ impl Blocks {
         block.is_some_and(|block| block.keys.contains(&key))
     }
 
-    /// Makes a voxel occupied or free; where that is news, the blocks whose faces it changes are
+    /// Sets the state of a voxel; on a change, the blocks with changed faces are
     /// added to `dirty`.
     pub fn set(
         &mut self,
@@ -92,7 +92,7 @@ impl Blocks {
         }
     }
 
-    /// Gives a block as many ids as it has markers; keeps the ones it had.
+    /// Assigns as many ids as markers to a block, reusing its earlier ones.
     pub fn assign_ids(&mut self, id: BlockId, markers: usize) -> Ids {
         let Some(block) = self.blocks.get_mut(&id) else {
             return Ids {
@@ -117,7 +117,7 @@ impl Blocks {
     }
 }
 
-/// The key at a difference of lattice indices; `None` beyond the range of keys.
+/// Key at an index offset; `None` beyond the range of keys.
 pub fn offset(key: MortonKey, difference: &LatticeIndex) -> Option<MortonKey> {
     let w = key.unpack();
     MortonKey::pack([

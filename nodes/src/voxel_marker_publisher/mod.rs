@@ -1,6 +1,6 @@
-//! Markers of the map for viewers: exposed cell faces in blocks, only what changed.
+//! `voxel_marker_publisher`: markers of exposed cell faces in blocks, updated incrementally.
 //!
-//! [`VoxelMarkers`] is a state machine without I/O; [`node`] runs it behind DDS.
+//! [`VoxelMarkers`] is a state machine without I/O; [`node`] connects it to DDS.
 
 mod blocks;
 mod color;
@@ -26,19 +26,19 @@ use crate::map_follower::{FollowError, Followed, MapFollower};
 
 /// Namespace of all markers.
 const NAMESPACE: &str = "voxels";
-/// Serialised bytes of a marker beside its points and colours, and of an array beside its markers.
+/// Serialized bytes of a marker besides points and colours, and of an array besides its markers.
 const OVERHEAD_BYTES: usize = 256;
 
-/// Counters of messages taken and markers given.
+/// Counters of messages received and markers published.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MarkerCounts {
     /// Chunks of `map` and `map_updates` received.
     pub messages_in: u64,
-    /// Chunks refused as malformed or too large.
+    /// Chunks rejected as malformed or too large.
     pub messages_refused: u64,
-    /// Times that a keyframe was found to be needed.
+    /// Keyframes needed.
     pub gaps: u64,
-    /// Arrays given out.
+    /// Arrays published.
     pub arrays_out: u64,
     /// Markers added or replaced.
     pub markers_added: u64,
@@ -46,41 +46,41 @@ pub struct MarkerCounts {
     pub markers_deleted: u64,
 }
 
-/// The end of a `voxel_marker_publisher`.
+/// Report of a `voxel_marker_publisher`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MarkerReport {
-    /// Everything counted by the state machine.
+    /// Counters of the state machine.
     pub counts: MarkerCounts,
-    /// Voxels of the map that it followed.
+    /// Voxels of the followed map.
     pub voxels: usize,
-    /// Bytes of all current markers: what a viewer that joins now receives. The node counts them as it draws, rounded
+    /// Bytes of all current markers, as sent to a late joiner. The node counts them while drawing, rounded
     /// up.
     pub marker_bytes: usize,
-    /// Bytes given out over the whole run.
+    /// Bytes published over the whole run.
     pub published_bytes: u64,
-    /// Arrays that the publisher did not take or could not send.
+    /// Arrays dropped by the publisher.
     pub arrays_not_published: u64,
-    /// Changed blocks that were not sent by the end.
+    /// Changed blocks not published by the end.
     #[serde(default)]
     pub blocks_not_drawn: usize,
-    /// Chunks of the map that found the inbox, or the queue before it, full.
+    /// Map chunks rejected by a full inbox or overrun before it.
     #[serde(default)]
     pub inbox_full: u64,
-    /// Chunks of the map that were sent and did not come.
+    /// Map chunks lost on the network.
     #[serde(default)]
     pub lost_on_network: u64,
-    /// Samples that did not decode.
+    /// Undecodable samples.
     #[serde(default)]
     pub undecodable: u64,
 }
 
-/// Follows a map and keeps the markers of its blocks up to date.
+/// Follows a map and updates the markers of its blocks.
 pub struct VoxelMarkers {
     options: MarkerOptions,
     follower: MapFollower,
     blocks: Blocks,
     dirty: BTreeSet<BlockId>,
-    /// Bytes of the markers of each block as they were drawn last.
+    /// Marker bytes of each block as last drawn.
     drawn: BTreeMap<BlockId, usize>,
     wipe: bool,
     style: MarkerStyle,
@@ -88,12 +88,12 @@ pub struct VoxelMarkers {
 }
 
 impl VoxelMarkers {
-    /// Times that the map was found to be another than its mapper's.
+    /// Number of detected differences from the mapper's map.
     pub fn map_differences(&self) -> u64 {
         self.follower.differences()
     }
 
-    /// Markers of no map yet.
+    /// Initial state without a map.
     pub fn new(options: MarkerOptions) -> Self {
         Self {
             follower: MapFollower::new(options.max_voxels),
@@ -107,7 +107,7 @@ impl VoxelMarkers {
         }
     }
 
-    /// Bytes as CDR of all arrays that are due, which then no longer are.
+    /// CDR bytes of all pending arrays, which are discarded.
     pub fn take_bytes(&mut self) -> usize {
         let mut bytes = 0;
         while self.is_dirty() {
@@ -118,12 +118,12 @@ impl VoxelMarkers {
         bytes
     }
 
-    /// Bytes of all markers as they were drawn last, rounded up.
+    /// Bytes of all markers as last drawn, rounded up.
     pub fn drawn_bytes(&self) -> usize {
         self.drawn.values().sum()
     }
 
-    /// Goes on with other options: everything is drawn again.
+    /// Changes the options and redraws everything.
     pub fn set_options(&mut self, options: MarkerOptions) {
         self.follower.set_max_voxels(options.max_voxels);
         if options.block_bits != self.options.block_bits {
@@ -138,51 +138,51 @@ impl VoxelMarkers {
         }
         self.options = options;
         self.style = self.wanted_style();
-        // Markers of other blocks or of another type go.
+        // Markers of other blocks or of another type are deleted.
         self.wipe();
     }
 
-    /// Takes a chunk of a keyframe.
+    /// Handles a keyframe chunk.
     pub fn on_map(&mut self, message: &LatticeMap) -> Result<Followed, FollowError> {
         let result = self.follower.on_map(message);
         self.after(result)
     }
 
-    /// Takes a chunk of an update.
+    /// Handles an update chunk.
     pub fn on_update(&mut self, message: &LatticeMapUpdate) -> Result<Followed, FollowError> {
         let result = self.follower.on_update(message);
         self.after(result)
     }
 
-    /// Draws everything again, for a viewer that has just come; what the others show stays.
+    /// Redraws everything for a late joiner; existing markers stay.
     pub fn redraw(&mut self) {
         self.dirty = self.blocks.ids().collect();
     }
 
-    /// Takes away all that viewers show and draws everything again.
+    /// Deletes all markers and redraws everything.
     pub fn wipe(&mut self) {
         self.wipe = true;
         self.redraw();
     }
 
-    /// True if a keyframe is to be asked for, since nothing more comes of an incomplete one. To be
+    /// True if a keyframe is to be requested because an incomplete one has timed out. To be
     /// called once a second.
-    pub fn wait_a_second(&mut self) -> bool {
-        self.follower.wait_a_second()
+    pub fn check_keyframe_timeout(&mut self) -> bool {
+        self.follower.check_keyframe_timeout()
     }
 
-    /// Blocks that changed since they were drawn.
+    /// Number of changed blocks.
     pub fn blocks_due(&self) -> usize {
         self.dirty.len()
     }
 
-    /// True if there is something to publish.
+    /// True if there are changes to publish.
     pub fn is_dirty(&self) -> bool {
         self.follower.map().is_some() && (self.wipe || !self.dirty.is_empty())
     }
 
-    /// Arrays of the blocks that changed, of at most `budget_bytes` together (but at least one
-    /// block); the rest stays for the next call.
+    /// Arrays of changed blocks, up to `budget_bytes` (but at least one
+    /// block); the rest stays pending.
     pub fn take_arrays(&mut self, budget_bytes: usize) -> Vec<MarkerArray> {
         let mut arrays = Vec::new();
         let Some(map) = self.follower.map() else {
@@ -237,12 +237,12 @@ impl VoxelMarkers {
         &self.counts
     }
 
-    /// Voxels of the map at hand.
+    /// Voxels of the current map.
     pub fn voxels(&self) -> usize {
         self.follower.map().map_or(0, |map| map.voxels().len())
     }
 
-    /// The style drawn now: the cheap one when the map is larger than `max_marker_voxels`.
+    /// Current style: points if the map exceeds `max_marker_voxels`.
     pub fn style(&self) -> MarkerStyle {
         self.style
     }
@@ -285,7 +285,7 @@ impl VoxelMarkers {
     }
 }
 
-/// A marker without points that deletes.
+/// Delete marker without points.
 fn bare(header: &Header, id: i32, action: i32) -> Marker {
     let mut pose = Pose::default();
     pose.orientation.w = 1.0;
@@ -299,7 +299,7 @@ fn bare(header: &Header, id: i32, action: i32) -> Marker {
     }
 }
 
-/// Bytes of a marker on the wire, rounded up.
+/// Serialized bytes of a marker, rounded up.
 fn marker_bytes(marker: &Marker) -> usize {
     OVERHEAD_BYTES
         + marker.header.frame_id.len()
@@ -307,7 +307,7 @@ fn marker_bytes(marker: &Marker) -> usize {
         + marker.colors.len() * 16
 }
 
-/// Fills arrays up to a size.
+/// Packs markers into arrays of bounded size.
 struct Packer {
     chunk_bytes: usize,
     open: MarkerArray,

@@ -1,4 +1,4 @@
-//! The marker publisher as a ROS node: a thin shell around [`VoxelMarkers`].
+//! ROS node around [`VoxelMarkers`].
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -19,7 +19,7 @@ use lattice_runtime::{Diagnostics, Level, Publisher, Runtime, Undecoded};
 /// Longest wait for readers at the end.
 const FLUSH: Duration = Duration::from_secs(1);
 
-/// Time after which a subscriber that does not acknowledge is a warning: two heartbeats of Fast DDS, which is the
+/// Acknowledgement delay that triggers a warning: two heartbeats of Fast DDS, the
 /// slowest to repair.
 const LATE: Duration = Duration::from_secs(6);
 
@@ -40,7 +40,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let settings = Settings::from_params(params)?;
     let publisher = node.lossless_publisher("voxel_markers", Qos::MARKERS)?;
     let losses = MapLosses::default();
-    let mut shell = Shell {
+    let mut compute_state = ComputeState {
         input: MapRequests::new(&node, &settings.mapper, &losses)?,
         machine: VoxelMarkers::new(settings.markers),
         markers: publisher.clone(),
@@ -54,7 +54,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         name,
         settings.limits,
         runtime.shutdown_handle(),
-        move |event| shell.on(event),
+        move |event| compute_state.on(event),
     )?;
     let inbox = compute.inbox();
     let subscriptions = losses.subscribe(&node, &inbox, Event::Map, Event::Update)?;
@@ -81,19 +81,19 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 }
 
 /// State of the compute thread.
-struct Shell {
+struct ComputeState {
     input: MapRequests,
     machine: VoxelMarkers,
     markers: Publisher<MarkerArray>,
     diagnostics: Diagnostics,
     seconds: Throttle,
     budget_bytes: usize,
-    /// Begin of the wait for a subscriber that has not acknowledged the markers before.
+    /// Start of the wait for acknowledgements.
     waits_since: Option<Instant>,
     report_file: String,
 }
 
-impl Shell {
+impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Map(chunk) => {
@@ -107,7 +107,7 @@ impl Shell {
             Event::Redraw => self.machine.redraw(),
             Event::Draw => {
                 self.input.make_good();
-                if self.seconds.check().is_some() && self.machine.wait_a_second() {
+                if self.seconds.check().is_some() && self.machine.check_keyframe_timeout() {
                     self.input.ask_for_keyframe();
                 }
                 self.draw();
@@ -121,8 +121,8 @@ impl Shell {
         }
     }
 
-    /// Publishes changed blocks once the markers before are acknowledged. Until then further changes add up, and a
-    /// block that changed many times is sent once.
+    /// Publishes changed blocks once the previous markers are acknowledged. Until then changes accumulate, and a
+    /// block with many changes is sent once.
     fn draw(&mut self) {
         if !self.markers.is_acknowledged() {
             self.waits_since.get_or_insert_with(Instant::now);
@@ -148,7 +148,7 @@ impl Shell {
             (_, _, Some(waits)) => {
                 let seconds = waits.as_secs();
                 let text = format!(
-                    "a subscriber has not acknowledged for {seconds} s: no markers until it does or goes"
+                    "a subscriber has not acknowledged for {seconds} s: publication waits until it does or leaves"
                 );
                 (Level::Warn, text)
             }
@@ -159,7 +159,7 @@ impl Shell {
                 (Level::Warn, text)
             }
             (_, 0, None) => (Level::Ok, format!("{:?}", self.machine.style())),
-            (_, refused, None) => (Level::Warn, format!("{refused} messages refused")),
+            (_, refused, None) => (Level::Warn, format!("{refused} messages rejected")),
         };
         let mut values = report::key_values(counts);
         let losses = self.input.losses();
@@ -176,7 +176,7 @@ impl Shell {
     }
 
     fn finish(&mut self) {
-        // One budget after another, as fast as viewers take them, for a moment.
+        // Several budgets in sequence, as fast as viewers acknowledge, for a limited time.
         let begin = Instant::now();
         self.draw();
         while self.markers.flush(FLUSH.saturating_sub(begin.elapsed()))

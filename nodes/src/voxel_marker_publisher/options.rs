@@ -1,9 +1,9 @@
-//! Parameters of the marker publisher.
+//! Options of the marker publisher.
 
 use crate::options::{chunk_bytes, one_of};
 use lattice_runtime::params::{ParamError, Params};
 
-/// Shape of a voxel.
+/// Marker shape of a voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MarkerStyle {
     /// Its Voronoi cell, exposed faces only (TRIANGLE_LIST).
@@ -14,12 +14,12 @@ pub enum MarkerStyle {
     Points,
 }
 
-/// Meaning of the colour.
+/// Colour scheme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColorBy {
-    /// Height of each vertex; 16 more bytes each.
+    /// By the height of each vertex; 16 more bytes each.
     Height,
-    /// One colour a marker, by the height of its block.
+    /// One colour per marker, by the height of its block.
     Flat,
 }
 
@@ -28,19 +28,19 @@ pub enum ColorBy {
 pub struct MarkerOptions {
     /// Shape of voxels.
     pub style: MarkerStyle,
-    /// Meaning of the colour.
+    /// Colour scheme.
     pub color_by: ColorBy,
-    /// Heights between two equal hues, in m.
+    /// Height period of the hues, m.
     pub height_period_m: f64,
     /// Opacity.
     pub alpha: f32,
     /// Blocks are `2^block_bits` lattice indices a side.
     pub block_bits: u32,
-    /// Largest serialised array.
+    /// Largest serialized array.
     pub chunk_bytes: usize,
-    /// Maps of more voxels are drawn as points.
+    /// Voxel count above which maps are drawn as points.
     pub max_marker_voxels: usize,
-    /// Largest map followed.
+    /// Voxel limit of the followed map.
     pub max_voxels: usize,
 }
 

@@ -1,4 +1,4 @@
-//! All parameters of the marker publisher.
+//! Parameters of the marker publisher.
 
 use std::time::Duration;
 
@@ -10,24 +10,24 @@ use lattice_runtime::params::{About, ParamError, Params};
 use lattice_runtime::qos::Qos;
 
 const ABOUT: &[About] = about! {
-    "style": "cells (true cell shapes, exposed faces only), cubes or points.";
-    "color_by": "height (of each vertex) or flat (one colour a marker, 40 % fewer bytes).";
-    "height_period_m": "Heights between two equal hues.";
+    "style": "Marker style: cells (Voronoi cells, exposed faces only), cubes or points.";
+    "color_by": "Colour scheme: height (of each vertex) or flat (one colour per marker, 40 % fewer bytes).";
+    "height_period_m": "Height period of the hues.";
     "alpha": "Opacity.";
-    "block_bits": "Blocks are 2^block_bits lattice indices a side; a change republishes its whole block.";
+    "block_bits": "Block size: 2^block_bits lattice indices a side; a change republishes its whole block.";
     "chunk_bytes": "Largest message, bytes.";
-    "max_marker_voxels": "Maps of more voxels are drawn as points.";
-    "max_voxels": "Larger maps are not followed.";
-    "rate_hz": "How often changes are published.";
-    "max_bytes_per_s": "Most bytes a second that are published.";
+    "max_marker_voxels": "Voxel count above which maps are drawn as points.";
+    "max_voxels": "Voxel limit of the followed map.";
+    "rate_hz": "Rate of publishing changes.";
+    "max_bytes_per_s": "Limit of published bytes per second.";
 };
 
-/// Settings of the node by its parameters.
+/// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub markers: MarkerOptions,
     pub limits: ComputeLimits,
     pub period: Duration,
-    /// Most bytes of a period.
+    /// Byte budget per period.
     pub budget_bytes: usize,
     pub mapper: String,
     pub report_file: String,
@@ -41,7 +41,7 @@ impl Settings {
         let rate_hz = params.f64_in("rate_hz", 5.0, 0.1..=100.0)?;
         let bytes_per_s = params.positive("max_bytes_per_s", 20_000_000)?;
         let markers = MarkerOptions::from_params(params)?;
-        // Two arrays in a row are longer than one may be, so these find room in the history and in the queue.
+        // Two consecutive arrays exceed the size of one, so these fit into the history and the queue.
         let most_bytes = Qos::MARKERS.depth / 2 * markers.chunk_bytes;
         Ok(Self {
             limits: ComputeLimits {
@@ -58,7 +58,7 @@ impl Settings {
     }
 }
 
-/// Reads all parameters of the node, as its start does.
+/// Declares all parameters of the node, as at its start.
 pub fn declare(params: &Params) -> Result<(), ParamError> {
     Settings::from_params(params).map(drop)
 }

@@ -1,4 +1,4 @@
-//! The markers of one block: true cells, cubes or points.
+//! Markers of one block: Voronoi cells, cubes or points.
 
 use lattice_msgs::geometry_msgs::{Point, Vector3 as ScaleVector};
 use lattice_msgs::std_msgs::ColorRGBA;
@@ -11,7 +11,7 @@ use super::{OVERHEAD_BYTES, color};
 use crate::convert::geometry;
 use crate::map_follower::FollowedMap;
 
-/// Markers of a block, without header and ids; none when nothing of it is exposed.
+/// Markers of a block, without header and ids; empty if no face is exposed.
 pub fn of_block(
     map: &FollowedMap,
     blocks: &Blocks,
@@ -52,7 +52,7 @@ struct Builder<'a> {
     options: &'a MarkerOptions,
     side_m: f64,
     origin_m: Vector3<f64>,
-    /// Of the marker: viewers draw the cubes of a list along its axes.
+    /// Marker orientation: viewers draw the cubes of a list along its axes.
     rotation: UnitQuaternion<f64>,
     max_points: usize,
     points: Vec<Point>,
@@ -73,7 +73,7 @@ impl<'a> Builder<'a> {
             side_m,
             origin_m: Vector3::zeros(),
             rotation: UnitQuaternion::identity(),
-            // Whole polygons must fit: those of six corners have four triangles.
+            // A polygon is not split: one with six corners has four triangles.
             max_points: (room / point_bytes).max(12),
             points: Vec::new(),
             colors: Vec::new(),
@@ -81,7 +81,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Adds a convex polygon as a fan of triangles.
+    /// Adds a convex polygon as a triangle fan.
     fn polygon(&mut self, corners: &[Vector3<f64>]) {
         let [apex, rest @ ..] = corners else { return };
         self.make_room(3 * rest.len().saturating_sub(1));

@@ -1,20 +1,22 @@
 //! Bodies of the targets of what clients of the viewer send: heads of requests, messages of the protocol.
 
-use lattice_nodes::viewer_server::{AdvertisedService, Desk, Gate, Head, Offer, OpenTopic, Step};
+use lattice_nodes::viewer_server::{
+    AdvertisedService, ClientSession, Head, Offer, OpenTopic, RequestAuth, SessionAction,
+};
 
 /// Reads the head of a request, and decides on it.
 pub fn http_head(bytes: &[u8]) {
     if let Ok(Some((head, length))) = Head::parse(bytes) {
         assert!(length <= bytes.len());
         let token = Some("secret".to_owned());
-        for gate in [
-            Gate::default(),
-            Gate {
+        for auth in [
+            RequestAuth::default(),
+            RequestAuth {
                 token,
-                ..Gate::default()
+                ..RequestAuth::default()
             },
         ] {
-            gate.decide(&head);
+            auth.decide(&head);
         }
         // The same once more, whatever follows it.
         let again = Head::parse(&[&bytes[..length], b"more"].concat());
@@ -22,7 +24,7 @@ pub fn http_head(bytes: &[u8]) {
     }
 }
 
-/// Gives one client's messages to a desk that offers all, and to one that offers nothing: kind, length (two
+/// Gives one client's messages to a session that offers all, and to one that offers nothing: kind, length (two
 /// bytes), message, and so on.
 pub fn client_message(bytes: &[u8]) {
     let service = AdvertisedService {
@@ -53,7 +55,7 @@ pub fn client_message(bytes: &[u8]) {
         Offer::default(),
     );
     for (offer, may_ask) in [(&all, true), (&nothing, false)] {
-        let mut desk = Desk::new(offer);
+        let mut session = ClientSession::new(offer);
         let mut asked = 0_usize;
         let mut rest = bytes;
         while let [kind, low, high, tail @ ..] = rest {
@@ -61,20 +63,20 @@ pub fn client_message(bytes: &[u8]) {
             let (body, tail) = tail.split_at(length);
             rest = tail;
             let step = match kind % 3 {
-                0 => desk.text(&String::from_utf8_lossy(body)),
-                1 => desk.data(body),
+                0 => session.on_text(&String::from_utf8_lossy(body)),
+                1 => session.on_binary(body),
                 _ => {
-                    desk.answered();
+                    session.answered();
                     asked = asked.saturating_sub(1);
-                    Step::Done
+                    SessionAction::Done
                 }
             };
             match step {
-                Step::Ask(_) => {
+                SessionAction::Request(_) => {
                     asked += 1;
                     assert!(may_ask && asked <= 16);
                 }
-                Step::Input(input) => assert!(may_ask && input.topic == 1),
+                SessionAction::Input(input) => assert!(may_ask && input.topic == 1),
                 _ => {}
             }
         }

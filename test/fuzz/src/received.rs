@@ -94,7 +94,7 @@ pub fn follower(bytes: &[u8]) {
                 let update = cdr::from_slice::<LatticeMapUpdate>(body);
                 drop(update.map(|m| follower.on_update(&m).is_ok()));
             }
-            _ => drop(follower.wait_a_second()),
+            _ => drop(follower.check_keyframe_timeout()),
         }
         let voxels = follower.map().map_or(0, |map| map.voxels().len());
         assert!(voxels <= MOST, "{voxels} voxels");

@@ -15,7 +15,7 @@ use lattice_msgs::std_msgs::Empty;
 use lattice_nodes::lattice_mapper::LatticeMapper;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Node, Publisher, Runtime};
+use lattice_runtime::{Node, Publisher, Runtime, SubscriptionExecutor};
 use lattice_test::domain::TestDomain;
 use lattice_test::maps::{self, insert};
 use lattice_test::peer::{Nodes, params};
@@ -107,11 +107,21 @@ fn a_forged_keyframe_lasts_until_the_next_update() {
         });
         let _ = state.send(values.collect());
     };
-    let diagnostics = node.subscribe("/diagnostics", Qos::DIAGNOSTICS, Load::Small, hear);
+    let diagnostics = node.subscribe(
+        "/diagnostics",
+        Qos::DIAGNOSTICS,
+        SubscriptionExecutor::Shared,
+        hear,
+    );
     let _diagnostics = diagnostics.unwrap();
     let (ask, asked) = channel();
     let request = move |_: Arc<Empty>| _ = ask.send(());
-    let requests = node.subscribe("~/request_keyframe", Qos::DEFAULT, Load::Small, request);
+    let requests = node.subscribe(
+        "~/request_keyframe",
+        Qos::DEFAULT,
+        SubscriptionExecutor::Shared,
+        request,
+    );
     let _requests = requests.unwrap();
     let mut mapper = Mapper {
         machine: maps::mapper(maps::options(LatticeKind::Fcc, 0.125)),

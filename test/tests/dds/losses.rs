@@ -11,7 +11,7 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Runtime};
+use lattice_runtime::{Runtime, SubscriptionExecutor};
 use lattice_test::clouds::cloud;
 use lattice_test::domain::TestDomain;
 use lattice_test::maps::{self, insert};
@@ -56,8 +56,12 @@ fn what_does_not_decode_is_in_diagnostics_and_report() {
     let inputs = inputs.map(|(topic, ros_type)| raw(topic, ros_type));
     let (sender, heard) = channel();
     let hear = move |message| _ = sender.send(message);
-    let diagnostics =
-        node.subscribe::<DiagnosticArray>("/diagnostics", Qos::DIAGNOSTICS, Load::Small, hear);
+    let diagnostics = node.subscribe::<DiagnosticArray>(
+        "/diagnostics",
+        Qos::DIAGNOSTICS,
+        SubscriptionExecutor::Shared,
+        hear,
+    );
     let _diagnostics = diagnostics.unwrap();
     let mut missing = nodes.to_vec();
     while !missing.is_empty() {
@@ -105,12 +109,21 @@ fn updates_that_find_the_publisher_full_are_counted_each() {
     let node = runtime.node("peer").unwrap();
     let clouds = node.publisher("/points_enu", Qos::reliable(10)).unwrap();
     let qos = Qos::reliable(10_000);
-    let heard = node.subscribe::<LatticeMapUpdate>("/map_updates", qos, Load::Large, |_| {});
+    let heard = node.subscribe::<LatticeMapUpdate>(
+        "/map_updates",
+        qos,
+        SubscriptionExecutor::Dedicated,
+        |_| {},
+    );
     let heard = heard.unwrap();
     let (sender, stated) = channel();
     let hear = move |message| _ = sender.send(message);
-    let diagnostics =
-        node.subscribe::<DiagnosticArray>("/diagnostics", Qos::DIAGNOSTICS, Load::Small, hear);
+    let diagnostics = node.subscribe::<DiagnosticArray>(
+        "/diagnostics",
+        Qos::DIAGNOSTICS,
+        SubscriptionExecutor::Shared,
+        hear,
+    );
     let _diagnostics = diagnostics.unwrap();
     while clouds.subscriber_count() == 0 || heard.publisher_count() == 0 {
         std::thread::sleep(Duration::from_millis(1));

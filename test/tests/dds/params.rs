@@ -53,8 +53,8 @@ fn refused() -> Vec<(Value, Value)> {
         ),
         same(
             json!([["forget_after_s", 5.0]]),
-            "parameter `forget_after_s` of /lattice_mapper = 5.0 (set at run time): voxels either \
-             have stamps from the start on or never",
+            "parameter `forget_after_s` of /lattice_mapper = 5.0 (set at run time): stamps of voxels \
+             cannot be switched on or off at run time",
         ),
         // The first could be set, and is not.
         (
@@ -95,7 +95,7 @@ fn a_cyclone_peer_describes_dumps_edits_and_loads_parameters() {
     let of = |name: &str| described[name].clone();
     let expected = json!({
         "type": 3,
-        "description": "Time between two messages of map_centers.",
+        "description": "Period of map_centers.",
         "constraints": "",
         "read_only": false,
         "range": [[0.01, 86400.0]],
@@ -137,7 +137,7 @@ fn a_cyclone_peer_describes_dumps_edits_and_loads_parameters() {
         types[1][1]
             .as_str()
             .unwrap()
-            .contains("known here as RIHS01_9198"),
+            .contains("has the hash RIHS01_9198"),
         "{types}"
     );
     assert_eq!(types[2][0], false);

@@ -210,7 +210,7 @@ fn a_model_that_a_program_cannot_run_is_refused_at_the_start() {
         (
             "headset_cloud",
             "model:=/nowhere/model.onnx labels_from:=mesh",
-            "takes no labels of images",
+            "does not use label images",
         ),
         ("semantic_cloud", "backend:=caffe", "tract or ort"),
     ] {

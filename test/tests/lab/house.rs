@@ -169,7 +169,7 @@ fn a_mesh_that_is_no_house_is_refused_by_name() {
         property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
     for (face, message) in [
         ("3 0 1 2\n", "no free floor within walls"),
-        ("3 0 1 7\n", "triangle 0 has vertex 7"),
+        ("3 0 1 7\n", "triangle 0 refers to vertex 7"),
         ("2 0 1\n", "a polygon of 2 corners"),
     ] {
         fs::write(&mesh, format!("{head}{corners}{face}")).unwrap();

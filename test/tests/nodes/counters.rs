@@ -17,7 +17,7 @@ use lattice_nodes::start::Finish;
 use lattice_nodes::voxel_marker_publisher::{MarkerOptions, VoxelMarkers};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Node, Publisher, Runtime, Subscription};
+use lattice_runtime::{Node, Publisher, Runtime, Subscription, SubscriptionExecutor};
 use lattice_test::clouds::{cloud, labelled_cloud};
 use lattice_test::domain::TestDomain;
 use lattice_test::maps::{self, insert};
@@ -62,7 +62,12 @@ impl Driven {
                 let _ = state.send(status.clone());
             }
         };
-        let diagnostics = world.subscribe("/diagnostics", Qos::DIAGNOSTICS, Load::Small, hear);
+        let diagnostics = world.subscribe(
+            "/diagnostics",
+            Qos::DIAGNOSTICS,
+            SubscriptionExecutor::Shared,
+            hear,
+        );
         Self {
             task,
             finish: executables::find(node).unwrap()(&runtime, node).unwrap(),

@@ -191,7 +191,7 @@ fn maps_that_do_not_go_together_are_left_out_with_the_numbers() {
             show(&mut merger, i, robot);
         }
         merger.take_update();
-        let refusal = merger.shares()[1].refusal().unwrap().to_string();
+        let refusal = merger.robot_maps()[1].refusal().unwrap().to_string();
         assert!(refusal.contains(expected), "{number}: {refusal}");
         assert_eq!(of_merger(&merger), of_mappers(&[&robots[0]]));
     }
@@ -211,7 +211,7 @@ fn maps_that_do_not_go_together_are_left_out_with_the_numbers() {
         show(&mut merger, i, robot);
         merger.take_update();
     }
-    let refusal = merger.shares()[1].refusal().unwrap().to_string();
+    let refusal = merger.robot_maps()[1].refusal().unwrap().to_string();
     assert!(refusal.contains("origin"), "{refusal}");
 }
 

@@ -9,7 +9,7 @@ use lattice_nodes::lattice_mapper::LatticeMapper;
 use lattice_nodes::voxel_marker_publisher::{MarkerOptions, MarkerReport, VoxelMarkers, node};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Publisher, Runtime};
+use lattice_runtime::{Publisher, Runtime, SubscriptionExecutor};
 use lattice_test::domain::TestDomain;
 use lattice_test::maps;
 
@@ -76,7 +76,12 @@ fn all_budgets_of_markers_are_drawn_at_the_end() {
     let seen = Arc::clone(&shown);
     let show = move |array: Arc<MarkerArray>| seen.lock().unwrap().push((*array).clone());
     let _subscription = viewer
-        .subscribe("voxel_markers", Qos::MARKERS, Load::Small, show)
+        .subscribe(
+            "voxel_markers",
+            Qos::MARKERS,
+            SubscriptionExecutor::Shared,
+            show,
+        )
         .unwrap();
     let finish = node::start(&runtime, "voxel_marker_publisher").unwrap();
     let maps: Publisher<LatticeMap> = viewer.publisher("map", Qos::MAP).unwrap();

@@ -21,7 +21,7 @@ const LAYERS: [(&str, &str); 3] = [
     (
         "nodes/runtime/src",
         "sync names param_value params_file ros_args params security env logging qos error shutdown \
-         task_thread timer clock diagnostics loopback_domain remote port arrivals gaps confine cyclone rmw_zenoh peers gate neighbours endpoints outbox \
+         task_thread timer clock diagnostics loopback_domain remote port arrivals gaps confine cyclone rmw_zenoh peers lifecycle_gate discovered_graph endpoints outbox \
          graph local_bus publisher subscription service rosout shared node param_services \
          logger_services type_description action tf lifecycle process",
     ),
@@ -181,10 +181,10 @@ fn every_public_module_of_the_core_has_a_user() {
     }
 }
 
-/// Places that write files by other means than `WholeFile`: itself, and those whose files are read as far as
+/// Places that write files by other means than `AtomicFile`: itself, and those whose files are read as far as
 /// they go, the writers of bags and of the log; builds write where cargo says.
 const WRITERS: [&str; 4] = [
-    "nodes/src/files/whole.rs",
+    "nodes/src/files/atomic_write.rs",
     "nodes/bag/src/writer/",
     "nodes/runtime/cyclone_sys/build.rs",
     "nodes/runtime/src/logging/file.rs",
@@ -197,11 +197,11 @@ fn files_are_written_by_the_one_writer() {
             let name = file.strip_prefix(root()).unwrap().display().to_string();
             let is_test =
                 name.contains("/tests") || WRITERS.iter().any(|place| name.starts_with(place));
-            let code = code(&file).replace("WholeFile::create", "");
+            let code = code(&file).replace("AtomicFile::create", "");
             for writes in ["File::create", "fs::write("] {
                 assert!(
                     is_test || !code.contains(writes),
-                    "{name}: {writes} is not WholeFile"
+                    "{name}: {writes} is not AtomicFile"
                 );
             }
         }

@@ -19,7 +19,7 @@ use lattice_msgs::std_msgs::String as RosString;
 use lattice_runtime::env::{Network, TransportKind, ZenohSettings};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Node, Runtime, Subscription};
+use lattice_runtime::{Node, Runtime, Subscription, SubscriptionExecutor};
 use lattice_test::domain::TestDomain;
 use lattice_test::python::script;
 
@@ -127,7 +127,7 @@ fn hear<M: RosMessage>(node: &Node, topic: &str, qos: Qos) -> (Subscription, Rec
         // The test may have heard enough.
         let _ = sender.send(message);
     };
-    let subscription = node.subscribe::<M>(topic, qos, Load::Small, handler);
+    let subscription = node.subscribe::<M>(topic, qos, SubscriptionExecutor::Shared, handler);
     (subscription.unwrap(), receiver)
 }
 

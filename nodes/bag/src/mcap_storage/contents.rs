@@ -1,4 +1,4 @@
-//! Index of an MCAP file: schemas, channels, stretches of messages and counts.
+//! Index of an MCAP file: schemas, channels, message blocks and counts.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -14,22 +14,22 @@ use crate::{
     topic::absolute_name,
 };
 
-/// A stretch of the file that is read as one: a chunk, or messages outside of chunks.
+/// Part of the file that is read as a whole: a chunk, or messages outside of chunks.
 #[derive(Clone, Debug)]
 pub(super) struct Block {
-    /// Of its first record, bytes from the start of the file.
+    /// Offset of its first record, bytes.
     pub offset: u64,
-    /// Of all its records, bytes.
+    /// Length of all its records, bytes.
     pub len: u64,
     /// Opcode of its first record.
     pub opcode: u8,
     pub start_ns: u64,
     pub end_ns: u64,
-    /// The channels inside, where known.
+    /// Channels inside, if known.
     pub channels: Option<Box<[u16]>>,
-    /// True behind damage.
+    /// True after a damage.
     pub behind: bool,
-    /// True for messages that were found one by one where the checksum of their chunk is wrong.
+    /// True for messages recovered individually from a chunk with a wrong checksum.
     pub unchecked: bool,
 }
 
@@ -39,7 +39,7 @@ struct Schema {
     text: String,
 }
 
-/// Number of messages, and their first and last log time.
+/// Number of messages, with first and last log time.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Seen {
     pub messages: u64,
@@ -69,12 +69,12 @@ pub(super) struct Contents {
     pub blocks: Vec<Block>,
     pub counts: BTreeMap<u16, u64>,
     pub seen: Seen,
-    /// In order of the file.
+    /// Damages in the order of the file.
     pub damages: Vec<BagError>,
 }
 
 impl Contents {
-    /// Takes a schema or channel record; the error is a reason.
+    /// Adds a schema or channel record; the error is a reason.
     pub(super) fn take(&mut self, opcode: u8, body: &[u8]) -> Result<(), String> {
         match parse_record(opcode, body)? {
             Record::Schema { header, data } => {
@@ -104,7 +104,7 @@ impl Contents {
         Ok(())
     }
 
-    /// True if every channel that has messages is known, with its schema.
+    /// True if every channel with messages is known, with its schema.
     pub(super) fn is_complete(&self) -> bool {
         let has_schema = |c: &Channel| c.schema_id == 0 || self.schemas.contains_key(&c.schema_id);
         self.channels.values().all(has_schema)
@@ -114,7 +114,7 @@ impl Contents {
                 .all(|(id, count)| *count == 0 || self.channels.contains_key(id))
     }
 
-    /// The topics, and the topic of each channel. Files without any CDR channel are foreign.
+    /// Topics, and the topic of each channel. A file without CDR channels is rejected.
     pub(super) fn topics(
         &mut self,
         path: &Path,
@@ -130,7 +130,7 @@ impl Contents {
                     "an MCAP file of {} messages (profile {profile:?})",
                     encodings.join(" and ")
                 ),
-                remedy: "messages in CDR, as ROS 2 records them, are needed; convert it",
+                remedy: "convert it to CDR messages, as recorded by ROS 2",
             });
         }
         let mut info = StorageInfo {

@@ -1,8 +1,8 @@
-//! Lengths inside a record, checked before the `mcap` crate makes room for what they claim.
+//! Validation of lengths inside a record before the `mcap` crate allocates memory for them.
 
 use mcap::records::{Record, op};
 
-/// Parses a record whose lengths lie within it; the error is a reason.
+/// Parses a record after validating its lengths; the error is a reason.
 pub(super) fn parse_record(opcode: u8, body: &[u8]) -> Result<Record<'_>, String> {
     if fit(opcode, body).is_none() {
         let bytes = body.len();
@@ -35,7 +35,7 @@ fn fit(opcode: u8, body: &[u8]) -> Option<()> {
     }
 }
 
-/// The part of a record that is not looked at yet.
+/// Unread part of a record.
 struct Rest<'a>(&'a [u8]);
 
 impl<'a> Rest<'a> {
@@ -45,13 +45,13 @@ impl<'a> Rest<'a> {
         Some(taken)
     }
 
-    /// Something with its length before it.
+    /// Length-prefixed data.
     fn text(&mut self) -> Option<&'a [u8]> {
         let length = u32::from_le_bytes(self.take(4)?.try_into().ok()?);
         self.take(usize::try_from(length).ok()?)
     }
 
-    /// So many texts, after so many other bytes.
+    /// `count` length-prefixed texts, after skipping `skip` bytes.
     fn texts(&mut self, skip: usize, count: usize) -> Option<()> {
         let _ = self.take(skip)?;
         for _ in 0..count {

@@ -1,4 +1,4 @@
-//! MCAP storage files: summary where there is one, a scan of the whole file where not.
+//! MCAP storage files: indexed by the summary, or by a scan of the whole file.
 
 mod contents;
 mod lengths;
@@ -29,14 +29,14 @@ use lengths::parse_record;
 use records::{Cause, Place, RecordError, first_record};
 use stream::McapStream;
 
-/// An MCAP file whose contents are known.
+/// An indexed MCAP file.
 pub(crate) struct McapFile {
     path: PathBuf,
     temporary: Option<Arc<TempPath>>,
     blocks: Vec<Block>,
     topic_of: Arc<BTreeMap<u16, usize>>,
     damages: Vec<BagError>,
-    /// Messages that the summary counts, where it can be read.
+    /// Number of messages by the summary, if readable.
     pub(crate) claimed: Option<u64>,
     pub(crate) info: StorageInfo,
 }
@@ -91,7 +91,7 @@ impl McapFile {
         })
     }
 
-    /// The wanted messages in order of log time.
+    /// Selected messages in order of log time.
     pub(crate) fn stream(&self, filter: Filter) -> Result<StorageStream, BagError> {
         Ok(Box::new(McapStream::new(self, filter)?))
     }
@@ -109,7 +109,7 @@ fn read_profile(file: &mut File, path: &Path, size: u64) -> Result<String, BagEr
             Err(error) => RecordError::bad(place, error),
         },
         Some((opcode, _)) => {
-            let reason = format!("opcode {opcode} where the header record is due");
+            let reason = format!("opcode {opcode} in place of the header record");
             RecordError::bad(place, reason)
         }
         None => RecordError {

@@ -1,4 +1,4 @@
-//! Records of an MCAP file (<https://mcap.dev/spec>): the `mcap` crate's reader, fed in small pieces.
+//! Records of an MCAP file (<https://mcap.dev/spec>): the `mcap` crate's reader with bounded input.
 
 use std::{
     fmt,
@@ -17,20 +17,20 @@ use mcap::{
 use super::lengths::parse_record;
 use crate::{BagError, MAX_MESSAGE_BYTES};
 
-/// Opcode and length of a record, bytes.
+/// Length of a record's opcode and length field, bytes.
 pub(super) const RECORD_HEADER_BYTES: u64 = 9;
-/// Longest record of a file, chunks included, bytes.
+/// Longest accepted record, chunks included, bytes.
 const MAX_RECORD_BYTES: usize = 2 << 30;
-/// Longest record in a chunk, bytes: a message with its 22-byte header.
+/// Longest accepted record in a chunk, bytes: a message with its 22-byte header.
 const MAX_CHUNK_RECORD_BYTES: u64 = MAX_MESSAGE_BYTES + 22;
-/// Bytes that one of a compressed chunk can become at most: zstd repeats a byte 128 KiB long in 4.
+/// Largest compression ratio: zstd encodes a run of 128 KiB in 4 bytes.
 const MAX_CHUNK_RATIO: u64 = 1 << 15;
-/// A chunk's record without the name of its compression and its content, bytes.
+/// Length of a chunk record without compression name and content, bytes.
 pub(super) const CHUNK_HEADER_BYTES: usize = 40;
-/// Bytes asked of a file at once; memory grows by what is there, not by what a record claims.
+/// Bytes per read; memory grows with the available data, not with stated lengths.
 const READ_BYTES: usize = 1 << 16;
 
-/// The byte at which a record begins in its file, or in the content of the chunk at that byte.
+/// Position of a record in its file, or in the content of the chunk at that byte.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub byte: u64,
@@ -64,7 +64,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// An error of reading records, with its place.
+/// Error of reading records, with its position.
 #[derive(Debug)]
 pub(super) struct RecordError {
     pub place: Place,
@@ -73,7 +73,7 @@ pub(super) struct RecordError {
 
 #[derive(Debug)]
 pub(super) enum Cause {
-    /// The bytes end inside the record.
+    /// The data end inside the record.
     Cut,
     Bad(String),
     TooLarge {
@@ -89,7 +89,7 @@ impl RecordError {
         RecordError { place, cause }
     }
 
-    /// The bag's error, of a file of `size_bytes` with `readable_messages` before the damage.
+    /// Error for a file of `size_bytes` with `readable_messages` before the damage.
     pub(super) fn in_file(self, path: &Path, size_bytes: u64, readable_messages: u64) -> BagError {
         let path = path.to_path_buf();
         match self.cause {
@@ -121,14 +121,14 @@ impl RecordError {
     }
 }
 
-/// Takes a record's place, opcode and body.
+/// Callback with a record's position, opcode and body.
 type Visit<'a> = dyn FnMut(Place, u8, &[u8]) -> Result<ControlFlow<()>, RecordError> + 'a;
 
-/// The same for a record in a chunk, after which the next one always comes.
+/// Callback for a record in a chunk; the next one always follows.
 type VisitInChunk<'a> = dyn FnMut(Place, u8, &[u8]) -> Result<(), RecordError> + 'a;
 
-/// Calls `visit` with each record in `source`, the `len` bytes of a file from byte `start` on, until
-/// it breaks. Chunks come whole.
+/// Calls `visit` for each record in `source`, the `len` bytes of a file from byte `start` on, until
+/// it breaks. Chunks are passed as a whole.
 pub(super) fn visit_records(
     source: impl Read,
     (start, len): (u64, u64),
@@ -142,8 +142,8 @@ pub(super) fn visit_records(
     feed(source.take(len), len, options, Place::in_file(start), visit)
 }
 
-/// Calls `visit` with each record in the chunk record `body` at `byte` of its file. The chunk's CRC
-/// is checked after its last record.
+/// Calls `visit` for each record in the chunk record `body` at `byte` of its file. The chunk's CRC
+/// is verified after its last record.
 pub(super) fn visit_chunk(
     byte: u64,
     body: &[u8],
@@ -154,7 +154,7 @@ pub(super) fn visit_chunk(
         Ok(_) => return Err(RecordError::bad(Place::in_file(byte), "no chunk record")),
         Err(error) => return Err(RecordError::bad(Place::in_file(byte), error)),
     };
-    // Without padding behind the content: the reader subtracts a record that reaches into it.
+    // Without padding after the content: the reader would subtract a record that extends into it.
     let content_bytes = usize::try_from(header.compressed_size).unwrap_or(usize::MAX);
     let unpadded = CHUNK_HEADER_BYTES
         .saturating_add(header.compression.len())
@@ -162,7 +162,7 @@ pub(super) fn visit_chunk(
     let body = body.get(..unpadded).unwrap_or(body);
     let len = (body.len() as u64).to_le_bytes();
     let framed = (&[op::CHUNK][..]).chain(&len[..]).chain(body);
-    // The claimed size bounds nothing, but the bytes that are there do.
+    // The stated size is not trusted; the available bytes bound it.
     let limit = (body.len() as u64)
         .saturating_mul(MAX_CHUNK_RATIO)
         .min(header.uncompressed_size)
@@ -184,7 +184,7 @@ pub(super) fn visit_chunk(
     };
     match feed(framed, header.uncompressed_size, options, start, &mut visit) {
         Ok(_) => Ok(header),
-        // A cut chunk does not make a cut file.
+        // A truncated chunk does not truncate the file.
         Err(RecordError {
             place,
             cause: Cause::Cut,
@@ -193,7 +193,7 @@ pub(super) fn visit_chunk(
     }
 }
 
-/// Opcode and body of the record at byte `start` of a file of `size` bytes; nothing at its end.
+/// Opcode and body of the record at byte `start` of a file of `size` bytes; `None` at its end.
 pub(super) fn first_record(
     file: &mut File,
     start: u64,

@@ -1,4 +1,4 @@
-//! The way on behind damage of an MCAP file: the next chunk whose head is plausible.
+//! Resynchronisation after damage in an MCAP file: the next plausible chunk head.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -7,11 +7,11 @@ use mcap::records::op;
 
 use super::records::{CHUNK_HEADER_BYTES, RECORD_HEADER_BYTES};
 
-/// Bytes that are looked at at once, and those that a chunk's head takes with the name of its compression.
+/// Window size, and the largest length of a chunk's head with its compression name.
 const WINDOW_BYTES: usize = 1 << 20;
 const HEAD_BYTES: usize = RECORD_HEADER_BYTES as usize + CHUNK_HEADER_BYTES + 4;
 
-/// First byte at or behind `from` where a chunk of a file of `size` bytes seems to begin.
+/// First byte from `from` on where a chunk of a file of `size` bytes seems to begin.
 pub(super) fn next_chunk(file: &mut File, from: u64, size: u64) -> io::Result<Option<u64>> {
     let mut at = from;
     let mut window = Vec::new();
@@ -33,7 +33,7 @@ pub(super) fn next_chunk(file: &mut File, from: u64, size: u64) -> io::Result<Op
     Ok(None)
 }
 
-/// True if these bytes, of so many to the end of the file, are a chunk's head whose two lengths agree.
+/// True for a plausible chunk head with consistent lengths, within `left_bytes` of the file.
 fn is_chunk(head: &[u8], left_bytes: u64) -> bool {
     let number = |from: usize, bytes: usize| {
         let part = head.get(from..from + bytes)?;
@@ -42,7 +42,7 @@ fn is_chunk(head: &[u8], left_bytes: u64) -> bool {
     };
     let lengths = || {
         let record = number(1, 8)?;
-        // Behind two times, the size of the content and its checksum.
+        // After two times, the content size and its checksum.
         let name = number(37, 4).filter(|name| [0, 3, 4].contains(name))?;
         let content = number(41 + usize::try_from(name).ok()?, 8)?;
         Some((record, name.saturating_add(content)))

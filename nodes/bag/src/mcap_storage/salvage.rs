@@ -1,4 +1,4 @@
-//! Records of a damaged stretch of an MCAP file, found one by one by their heads.
+//! Recovery of individual records from a damaged part of an MCAP file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -13,19 +13,19 @@ use super::{
 };
 use crate::{MAX_MESSAGE_BYTES, sniff::ZSTD_MAGIC};
 
-/// Bytes read at once.
+/// Bytes per read.
 const WINDOW_BYTES: u64 = 1 << 20;
 /// Head of a message record: opcode, length, channel, sequence and two times, then the CDR header.
 const MESSAGE_HEAD_BYTES: usize = 9 + 22 + 4;
 /// Head of a chunk up to its times: opcode, length, first and last log time.
 const CHUNK_SPAN_BYTES: usize = 9 + 16;
-/// Log times that a bag takes, ns since the Unix epoch.
+/// Valid log times, ns since the Unix epoch.
 const ALL_TIMES: (u64, u64) = (0, i64::MAX as u64);
-/// Longest record of a schema or channel that is looked for, bytes.
+/// Longest recovered record of a schema or channel, bytes.
 const MAX_DEFINITION_BYTES: u64 = 1 << 20;
 /// Highest representation identifier of CDR (DDS-XTypes 1.3, table 60).
 const MAX_REPRESENTATION: u8 = 0x0b;
-/// Runs of messages are read in blocks of about this many bytes.
+/// Target size of blocks of consecutive messages, bytes.
 const RUN_BYTES: u64 = 1 << 20;
 
 /// Random access to the bytes of a file through a buffered window.
@@ -33,7 +33,7 @@ struct Window<'a> {
     file: &'a mut File,
     bytes: Vec<u8>,
     start: u64,
-    /// End of the stretch, bytes from the start of the file.
+    /// End of the part, bytes from the start of the file.
     end: u64,
 }
 
@@ -47,7 +47,7 @@ impl<'a> Window<'a> {
         }
     }
 
-    /// Up to `count` bytes at byte `at`, fewer at the end of the stretch.
+    /// Up to `count` bytes at byte `at`, fewer at the end of the part.
     fn at(&mut self, at: u64, count: usize) -> io::Result<&[u8]> {
         let left = self.end.saturating_sub(at);
         let count = count.min(usize::try_from(left).unwrap_or(usize::MAX));
@@ -68,16 +68,16 @@ impl<'a> Window<'a> {
     }
 }
 
-/// A record whose head is plausible.
+/// A plausible record head.
 #[derive(Clone, Copy)]
 struct Head {
     opcode: u8,
-    /// Of its body, bytes.
+    /// Length of its body, bytes.
     len: u64,
 }
 
 impl Head {
-    /// Bytes of the record.
+    /// Length of the record, bytes.
     fn bytes(self) -> u64 {
         RECORD_HEADER_BYTES + self.len
     }
@@ -88,7 +88,7 @@ fn number(bytes: &[u8], from: usize, count: usize) -> Option<u64> {
     Some(part.iter().rev().fold(0, |n, &b| n << 8 | u64::from(b)))
 }
 
-/// Head of any record of the format that ends within `left` bytes.
+/// Head of any record type that ends within `left` bytes.
 fn any_head(head: &[u8], left: u64) -> Option<Head> {
     let opcode = *head.first()?;
     let len = number(head, 1, 8)?;
@@ -97,7 +97,7 @@ fn any_head(head: &[u8], left: u64) -> Option<Head> {
 }
 
 /// Head of a message of a known channel, with a CDR header or that of a zstd frame.
-fn message_head<V>(head: &[u8], left: u64, known: &Known<'_, V>) -> Option<Head> {
+fn message_head<V>(head: &[u8], left: u64, bounds: &MessageBounds<'_, V>) -> Option<Head> {
     let found = any_head(head, left).filter(|found| found.opcode == op::MESSAGE)?;
     let shortest = MESSAGE_HEAD_BYTES as u64 - RECORD_HEADER_BYTES;
     let channel = u16::try_from(number(head, 9, 2)?).ok()?;
@@ -105,13 +105,13 @@ fn message_head<V>(head: &[u8], left: u64, known: &Known<'_, V>) -> Option<Head>
     let data = head.get(31..MESSAGE_HEAD_BYTES)?;
     let is_cdr = matches!(data, [0, ..=MAX_REPRESENTATION, ..]);
     let is_message = (shortest..=MAX_MESSAGE_BYTES + 22).contains(&found.len)
-        && known.channels.contains_key(&channel)
-        && (known.span.0..=known.span.1).contains(&log_time)
+        && bounds.channels.contains_key(&channel)
+        && (bounds.span.0..=bounds.span.1).contains(&log_time)
         && (is_cdr || data.starts_with(ZSTD_MAGIC));
     is_message.then_some(found)
 }
 
-/// Takes the schemas and channels between two bytes of the file that can be parsed and contradict none.
+/// Recovers schemas and channels between two bytes of the file, if they parse without contradiction.
 pub(super) fn definitions(
     file: &mut File,
     (start, end): (u64, u64),
@@ -151,10 +151,10 @@ fn is_name(name: &str) -> bool {
     !name.is_empty() && name.chars().all(|c| c.is_ascii_graphic())
 }
 
-/// Blocks of the messages between two bytes of the file, whose checksum is wrong or which have none.
+/// Blocks of messages between two bytes of the file, with a wrong or missing checksum.
 ///
-/// A message counts if its head is plausible and a plausible record, or nothing that could be a message,
-/// follows it. In a chunk its time lies within that of the chunk, unless none does.
+/// A message is accepted if its head is plausible and is followed by a plausible record, or by nothing that could be
+/// a message. In a chunk its time must lie within that of the chunk, unless no message's does.
 pub(super) fn messages<V>(
     file: &mut File,
     (start, end): (u64, u64),
@@ -162,7 +162,7 @@ pub(super) fn messages<V>(
 ) -> io::Result<Vec<Block>> {
     let mut window = Window::new(file, end);
     let span = chunk_span(window.at(start, CHUNK_SPAN_BYTES)?);
-    let of = |span| Known { channels, span };
+    let of = |span| MessageBounds { channels, span };
     let found = runs(&mut window, start, &of(span.unwrap_or(ALL_TIMES)))?;
     match span {
         Some(_) if found.is_empty() => runs(&mut window, start, &of(ALL_TIMES)),
@@ -170,38 +170,42 @@ pub(super) fn messages<V>(
     }
 }
 
-/// First and last log time of a chunk, by its head.
+/// First and last log time of a chunk, from its head.
 fn chunk_span(head: &[u8]) -> Option<(u64, u64)> {
     let span = (number(head, 9, 8)?, number(head, 17, 8)?);
     (head.first() == Some(&op::CHUNK) && span.0 <= span.1).then_some(span)
 }
 
-/// Known channels and bounds of log time for the messages of a stretch.
-struct Known<'a, V> {
+/// Known channels and log time range of the messages in a part.
+struct MessageBounds<'a, V> {
     channels: &'a BTreeMap<u16, V>,
     /// First and last log time, ns.
     span: (u64, u64),
 }
 
-fn runs<V>(window: &mut Window<'_>, start: u64, known: &Known<'_, V>) -> io::Result<Vec<Block>> {
+fn runs<V>(
+    window: &mut Window<'_>,
+    start: u64,
+    bounds: &MessageBounds<'_, V>,
+) -> io::Result<Vec<Block>> {
     let end = window.end;
     let mut runs = Runs::default();
-    let mut next = next_message(window, start, known)?;
+    let mut next = next_message(window, start, bounds)?;
     while let Some((at, head)) = next {
         let behind = at + head.bytes();
         let follows = window.at(behind, RECORD_HEADER_BYTES as usize)?;
         let is_followed = behind == end || any_head(follows, end - behind).is_some();
-        // A length that is too large hides the message behind.
+        // An excessive length would hide the message after it.
         let inside = match is_followed {
             true => None,
-            false => next_message(window, at + 1, known)?.filter(|(at, _)| *at < behind),
+            false => next_message(window, at + 1, bounds)?.filter(|(at, _)| *at < behind),
         };
         next = match inside {
             Some(inside) => Some(inside),
             None => {
                 let head_bytes = window.at(at, MESSAGE_HEAD_BYTES)?;
                 runs.add(at, head.bytes(), head_bytes);
-                next_message(window, behind, known)?
+                next_message(window, behind, bounds)?
             }
         };
     }
@@ -212,18 +216,18 @@ fn runs<V>(window: &mut Window<'_>, start: u64, known: &Known<'_, V>) -> io::Res
 fn next_message<V>(
     window: &mut Window<'_>,
     from: u64,
-    known: &Known<'_, V>,
+    bounds: &MessageBounds<'_, V>,
 ) -> io::Result<Option<(u64, Head)>> {
     for at in from..window.end {
         let left = window.end - at;
-        if let Some(head) = message_head(window.at(at, MESSAGE_HEAD_BYTES)?, left, known) {
+        if let Some(head) = message_head(window.at(at, MESSAGE_HEAD_BYTES)?, left, bounds) {
             return Ok(Some((at, head)));
         }
     }
     Ok(None)
 }
 
-/// Messages that follow each other without a gap.
+/// Consecutive messages without a gap.
 #[derive(Default)]
 struct Runs {
     blocks: Vec<Block>,

@@ -1,4 +1,4 @@
-//! Index of an MCAP file without a usable summary (unfinished, cut or unchunked), from its records.
+//! Index of an MCAP file without a usable summary (unfinished, truncated or unchunked), from its records.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -18,15 +18,15 @@ use super::{
 };
 use crate::{BagError, sniff::MCAP_MAGIC};
 
-/// Messages outside of chunks are read in runs of about this many bytes.
+/// Target size of blocks of messages outside of chunks, bytes.
 const RUN_BYTES: u64 = 1 << 20;
 
-/// Damages after which sound chunks are looked for, at most.
+/// Limit of damages after which valid chunks are searched.
 const MAX_DAMAGES: usize = 1000;
-/// Schemas and channels are looked for in so many bytes at the end, where a summary repeats them.
+/// Size of the file's end that is searched for schemas and channels, which a summary repeats, bytes.
 const MAX_SUMMARY_BYTES: u64 = 16 << 20;
 
-/// Everything up to the end of the data or the first damage; behind it only the blocks, not counted.
+/// Indexes a file up to the end of the data or the first damage; after it only blocks, without counts.
 pub(super) fn scan(file: &mut File, path: &Path, size: u64) -> Contents {
     let mut scan = Scan::default();
     let ended = scan.records(file, MCAP_MAGIC.len() as u64, size);
@@ -37,7 +37,7 @@ pub(super) fn scan(file: &mut File, path: &Path, size: u64) -> Contents {
         Ok(ControlFlow::Continue(())) => scan.contents.damages.push(BagError::Truncated {
             path: path.to_path_buf(),
             size_bytes: size,
-            inside: format!("the data section: a record is due at byte {size}"),
+            inside: format!("the data section: a record is expected at byte {size}"),
             readable_messages,
         }),
         Err(error) => scan.go_on(file, path, size, error),
@@ -48,14 +48,14 @@ pub(super) fn scan(file: &mut File, path: &Path, size: u64) -> Contents {
 #[derive(Default)]
 struct Scan {
     contents: Contents,
-    /// Messages outside of chunks that are not yet a block.
+    /// Messages outside of chunks that are not in a block yet.
     run: Option<(Block, BTreeSet<u16>)>,
-    /// True behind damage.
+    /// True after a damage.
     behind: bool,
 }
 
 impl Scan {
-    /// Takes the messages of the damaged stretch, the sound chunks behind it, and what follows them.
+    /// Adds the messages of the damaged part, the valid chunks after it, and the records after them.
     fn go_on(&mut self, file: &mut File, path: &Path, size: u64, error: RecordError) {
         let readable_messages = self.contents.seen.messages;
         self.behind = true;
@@ -106,7 +106,7 @@ impl Scan {
                 op::MESSAGE => self.message(place, body)?,
                 op::SCHEMA | op::CHANNEL => self.take(place, opcode, body)?,
                 0 => {
-                    let reason = "opcode 0, which no record has; a crash may have left zeros";
+                    let reason = "opcode 0 is not valid; a crash may have left zeros";
                     return Err(RecordError::bad(place, reason));
                 }
                 _ => {}
@@ -117,10 +117,10 @@ impl Scan {
 
     fn chunk(&mut self, byte: u64, body: &[u8]) -> Result<(), RecordError> {
         self.end_run();
-        // By channel, so that a chunk of countless small messages takes no memory for them.
+        // Per channel, so that a chunk of many small messages needs no memory for them.
         let mut seen: BTreeMap<u16, (Place, Seen)> = BTreeMap::new();
         let mut records = Vec::new();
-        // The content of a chunk counts only once its CRC is right.
+        // The content of a chunk counts only with a valid CRC.
         let header = visit_chunk(byte, body, &mut |place, opcode, body| {
             match opcode {
                 op::MESSAGE => {
@@ -163,7 +163,7 @@ impl Scan {
         Ok(())
     }
 
-    /// Takes a message outside of chunks.
+    /// Adds a message outside of chunks.
     fn message(&mut self, place: Place, body: &[u8]) -> Result<(), RecordError> {
         let (message, _) = parse_message(place, body)?;
         let (channel, log_time_ns) = (message.channel_id, message.log_time);
@@ -209,7 +209,7 @@ impl Scan {
             true => Ok(()),
             false => Err(RecordError::bad(
                 place,
-                format!("a message of channel {channel}, which no record announced"),
+                format!("a message of the undeclared channel {channel}"),
             )),
         }
     }

@@ -1,4 +1,4 @@
-//! Messages of an MCAP file in order of log time, holding only the blocks that overlap.
+//! Messages of an MCAP file in order of log time; only overlapping blocks are in memory.
 
 use std::{
     cmp::Reverse,
@@ -24,7 +24,7 @@ use crate::{
     storage::{Filter, StorageMessage},
 };
 
-/// Messages of overlapping blocks may wait in memory up to this size, bytes.
+/// Memory limit for messages of overlapping blocks, bytes.
 const MAX_WAITING_BYTES: u64 = 2 << 30;
 
 pub(super) struct McapStream {
@@ -32,7 +32,7 @@ pub(super) struct McapStream {
     path: PathBuf,
     /// Keeps a decompressed copy alive.
     _temporary: Option<Arc<TempPath>>,
-    /// Not yet read, by time.
+    /// Unread blocks, by time.
     blocks: VecDeque<Block>,
     blocks_read: u64,
     topic_of: Arc<BTreeMap<u16, usize>>,
@@ -42,7 +42,7 @@ pub(super) struct McapStream {
     damages: VecDeque<BagError>,
 }
 
-/// A message that was read; sorts by time, then by place in the file.
+/// A buffered message, ordered by time, then by position in the file.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 struct Waiting {
     log_time_ns: i64,
@@ -54,7 +54,7 @@ struct Waiting {
 }
 
 impl Waiting {
-    /// Memory that it takes, without data too.
+    /// Memory use, including the entry itself.
     fn bytes(&self) -> u64 {
         (size_of::<Waiting>() + self.data.len()) as u64
     }
@@ -70,7 +70,7 @@ impl McapStream {
                     .iter()
                     .any(|id| topic_of.get(id).is_none_or(|t| filter.wants_topic(*t)))
             });
-            // Empty chunks may carry a reversed range.
+            // Empty chunks may have a reversed time range.
             let is_meant = filter.past_damage || !block.behind;
             is_meant && has_topic && filter.overlaps((clamp(block.start_ns), clamp(block.end_ns)))
         };
@@ -92,7 +92,7 @@ impl McapStream {
         })
     }
 
-    /// True if a block may hold a message earlier than all that wait.
+    /// True if a block may contain a message earlier than all buffered ones.
     fn needs_block(&self) -> bool {
         match (self.blocks.front(), self.waiting.peek()) {
             (None, _) => false,
@@ -103,7 +103,7 @@ impl McapStream {
         }
     }
 
-    /// Puts the messages of a damaged chunk in its place.
+    /// Replaces a damaged chunk by its recovered messages.
     fn salvage(&mut self, chunk: &Block) {
         let stretch = (chunk.offset, chunk.offset.saturating_add(chunk.len));
         match salvage::messages(&mut self.file, stretch, &self.topic_of) {
@@ -123,7 +123,7 @@ impl McapStream {
             .seek(SeekFrom::Start(block.offset))
             .map_err(|error| RecordError::bad(start, error))?;
         let (filter, topic_of) = (&self.filter, &self.topic_of);
-        // A chunk counts only once its CRC is right.
+        // A chunk counts only with a valid CRC.
         let mut read = Vec::new();
         let mut waiting_bytes = self.waiting_bytes;
         let mut take = |place, opcode, body: &[u8]| {
@@ -134,7 +134,7 @@ impl McapStream {
                 waiting_bytes = waiting_bytes.saturating_add(message.bytes());
                 if waiting_bytes > MAX_WAITING_BYTES {
                     let cause = Cause::TooLarge {
-                        what: "all that chunks overlapping in time hold",
+                        what: "the content of chunks overlapping in time",
                         size_bytes: waiting_bytes,
                         limit_bytes: MAX_WAITING_BYTES,
                     };
@@ -158,7 +158,7 @@ impl McapStream {
             Ok(ControlFlow::Continue(()))
         })
         .map_err(|error| match error.cause {
-            Cause::Cut => RecordError::bad(error.place, "a record longer than the index has it"),
+            Cause::Cut => RecordError::bad(error.place, "a record longer than stated in the index"),
             _ => error,
         })?;
         self.waiting_bytes = waiting_bytes;
@@ -167,7 +167,7 @@ impl McapStream {
     }
 }
 
-/// The message, if the filter wants it.
+/// The message, if selected by the filter.
 fn wanted(
     place: Place,
     body: &[u8],
@@ -209,7 +209,7 @@ impl Iterator for McapStream {
                     }
                     return Some(Err(error));
                 }
-                // The waiting messages are whole, and earlier or close by: the error follows them.
+                // The buffered messages are valid, and earlier or close by: the error follows them.
                 self.blocks.clear();
                 self.damages = VecDeque::from([error]);
             }

@@ -17,14 +17,14 @@ use super::{
     records::{Cause, RECORD_HEADER_BYTES, RecordError, first_record, visit_records},
 };
 
-/// Bytes of the footer record (9 + 20) and of the magic behind it.
+/// Length of the footer record (9 + 20) and of the magic after it, bytes.
 const TAIL_BYTES: u64 = 37;
-/// Bytes of the data end record, which precedes the summary.
+/// Length of the data end record, which precedes the summary, bytes.
 const DATA_END_BYTES: u64 = 13;
-/// Longer records in a summary are refused, bytes.
+/// Longest accepted record of a summary, bytes.
 const MAX_RECORD_BYTES: usize = 64 << 20;
 
-/// The contents by the summary, or the reason to scan the file instead.
+/// Contents from the summary, or the reason to scan the file instead.
 pub(super) fn read_summary(file: &mut File, size: u64) -> Result<Contents, String> {
     let start = summary_start(file, size)?;
     let mut found = Found::default();
@@ -67,7 +67,7 @@ fn summary_start(file: &mut File, size: u64) -> Result<u64, String> {
     let start = match first_record(file, tail, size) {
         Ok(Some((op::FOOTER, body))) => match parse_record(op::FOOTER, &body) {
             Ok(Record::Footer(footer)) => footer.summary_start,
-            _ => return Err("its footer cannot be read".into()),
+            _ => return Err("its footer is invalid".into()),
         },
         _ => return Err("it does not end with a footer".into()),
     };
@@ -88,7 +88,7 @@ struct Found {
 }
 
 impl Found {
-    /// Reads from the end of the data section, so that the reader checks the summary's CRC.
+    /// Reads from the end of the data section, so that the reader verifies the summary's CRC.
     fn read(&mut self, file: &mut File, start: u64, size: u64) -> Result<(), String> {
         let from = start.saturating_sub(DATA_END_BYTES);
         file.seek(SeekFrom::Start(from))
@@ -99,7 +99,7 @@ impl Found {
             .with_record_length_limit(MAX_RECORD_BYTES);
         visit_records(file, range, options, &mut |place, opcode, body| {
             if (place.byte == from) != (opcode == op::DATA_END) {
-                let reason = "no end of the data just before it";
+                let reason = "the data end record does not precede it";
                 return Err(RecordError::bad(place, reason));
             }
             self.take(opcode, body)
@@ -109,12 +109,12 @@ impl Found {
         .map(|_| ())
         .map_err(|error| match error.cause {
             Cause::Bad(reason) => format!("its summary at {}: {reason}", error.place),
-            _ => format!("its summary is cut at {}", error.place),
+            _ => format!("its summary is truncated at {}", error.place),
         })
     }
 
     fn take(&mut self, opcode: u8, body: &[u8]) -> Result<(), String> {
-        // Attachments are left out on purpose: nothing of them is used.
+        // Attachments are not used.
         match opcode {
             op::SCHEMA | op::CHANNEL => self.contents.take(opcode, body)?,
             op::CHUNK_INDEX | op::STATISTICS => match parse_record(opcode, body)? {
@@ -133,7 +133,7 @@ fn block(chunk: ChunkIndex, data_end: u64) -> Result<Block, String> {
     let ends_in_data = offset.checked_add(len).is_some_and(|end| end <= data_end);
     if !ends_in_data || len < RECORD_HEADER_BYTES {
         return Err(format!(
-            "its summary places a chunk of {len} bytes at byte {offset}, beyond the data"
+            "its summary places a chunk of {len} bytes at byte {offset}, outside the data"
         ));
     }
     let channels = chunk.message_index_offsets;

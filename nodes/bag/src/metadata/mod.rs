@@ -13,17 +13,17 @@ use serde::{Deserialize, Serialize};
 
 use super::{BagError, BagQos, yaml};
 
-/// The version written, and the newest read.
+/// Version written, and the newest one read.
 pub(crate) const METADATA_VERSION: u32 = 9;
-/// Larger metadata files are refused, bytes.
+/// Largest metadata file, bytes.
 const MAX_METADATA_BYTES: u64 = 16 << 20;
 /// Start of an empty bag, ns.
 pub(crate) const EMPTY_START_NS: i64 = i64::MAX;
 
-/// Compression of storage files or messages outside the storage's own means.
+/// Compression of storage files or messages besides that of the storage format.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum CompressionMode {
-    /// Not at all.
+    /// No compression.
     #[default]
     None,
     /// Each storage file.
@@ -32,12 +32,12 @@ pub(crate) enum CompressionMode {
     Message,
 }
 
-/// The content of `metadata.yaml`.
+/// Content of `metadata.yaml`.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct Metadata {
     pub version: u32,
-    /// Not trusted: the storage files tell by their first bytes.
+    /// Ignored: storage files are identified by their first bytes.
     #[serde(deserialize_with = "null_is_default")]
     pub storage_identifier: String,
     pub duration: Nanoseconds,
@@ -54,7 +54,7 @@ pub(crate) struct Metadata {
     pub relative_file_paths: Vec<String>,
     #[serde(deserialize_with = "null_is_default")]
     pub files: Vec<FileInformation>,
-    /// Nothing: its users' own pairs are not read.
+    /// Ignored user data.
     #[serde(skip_deserializing)]
     pub custom_data: (),
     #[serde(deserialize_with = "null_is_default")]
@@ -111,7 +111,7 @@ pub(crate) struct FileInformation {
     pub message_count: u64,
 }
 
-/// First and last log time, or nothing without messages.
+/// First and last log time; `None` without messages.
 fn range_ns(start: StartingTime, duration: Nanoseconds, message_count: u64) -> Option<(i64, i64)> {
     let start_ns = start.nanoseconds_since_epoch;
     let end_ns = start_ns.checked_add(duration.nanoseconds.max(0))?;
@@ -119,7 +119,7 @@ fn range_ns(start: StartingTime, duration: Nanoseconds, message_count: u64) -> O
 }
 
 impl FileInformation {
-    /// First and last log time of the file, or nothing without messages.
+    /// First and last log time of the file; `None` without messages.
     pub(crate) fn range_ns(&self) -> Option<(i64, i64)> {
         range_ns(self.starting_time, self.duration, self.message_count)
     }
@@ -131,7 +131,7 @@ struct Document {
 }
 
 impl Metadata {
-    /// Reads and checks the file.
+    /// Reads and validates the file.
     pub(crate) fn read(path: &Path) -> Result<Metadata, BagError> {
         let file = File::open(path).map_err(BagError::io(path, "open"))?;
         let mut text = String::new();
@@ -163,14 +163,14 @@ impl Metadata {
             0 => return Err(wrong("metadata without a version".into())),
             newer => {
                 return Err(wrong(format!(
-                    "metadata version {newer} is newer than {METADATA_VERSION}, the last one known"
+                    "metadata version {newer} is newer than {METADATA_VERSION}, the latest supported"
                 )));
             }
         }
         Ok(metadata)
     }
 
-    /// First and last log time of the bag, or nothing without messages.
+    /// First and last log time of the bag; `None` without messages.
     pub(crate) fn range_ns(&self) -> Option<(i64, i64)> {
         range_ns(self.starting_time, self.duration, self.message_count)
     }
@@ -186,19 +186,19 @@ impl Metadata {
             && (self.files.is_empty() || of_files == self.message_count)
     }
 
-    /// The text of `metadata.yaml`.
+    /// Text of `metadata.yaml`.
     pub(crate) fn to_text(&self) -> Result<String, serde_yaml::Error> {
         serde_yaml::to_string(&Document {
             rosbag2_bagfile_information: self.clone(),
         })
     }
 
-    /// The text that storage files embed.
+    /// Text embedded in storage files.
     pub(crate) fn to_embedded_text(&self) -> Result<String, serde_yaml::Error> {
         Ok(serde_yaml::to_string(self)?.trim_end().to_owned())
     }
 
-    /// The compression mode, if its format is known.
+    /// Compression mode, if its format is supported.
     pub(crate) fn compression(&self, path: &Path) -> Result<CompressionMode, BagError> {
         let mode = match self.compression_mode.to_ascii_lowercase().as_str() {
             "" | "none" => return Ok(CompressionMode::None),
@@ -208,7 +208,7 @@ impl Metadata {
                 return Err(BagError::unsupported(
                     path,
                     format!("compression mode {:?}", self.compression_mode),
-                    "none, file and message are known; convert with `ros2 bag convert`",
+                    "none, file and message are supported; convert with `ros2 bag convert`",
                 ));
             }
         };
@@ -218,11 +218,11 @@ impl Metadata {
         Err(BagError::unsupported(
             path,
             format!("compression format {:?}", self.compression_format),
-            "zstd is known; decompress the files, or convert with `ros2 bag convert`",
+            "only zstd is supported; decompress the files, or convert with `ros2 bag convert`",
         ))
     }
 
-    /// The storage files below `bag`, each with its name in the metadata. Leaving `bag` is refused.
+    /// Storage files below `bag`, each with its name in the metadata. Paths outside `bag` are rejected.
     pub(crate) fn storage_paths(
         &self,
         bag: &Path,
@@ -233,7 +233,7 @@ impl Metadata {
             let normal = relative
                 .components()
                 .all(|c| matches!(c, Component::Normal(_)));
-            // Drive letters and backslashes are plain names on Unix, yet never meant so in a bag.
+            // Drive letters and backslashes are valid names on Unix, but not intended as such in a bag.
             if entry.is_empty() || !normal || entry.contains(['\\', '\0']) {
                 return Err(BagError::PathTraversal {
                     path: path.to_path_buf(),
@@ -251,7 +251,7 @@ impl Metadata {
     }
 }
 
-/// A number of messages; one that is negative or no integer counts as 0.
+/// Number of messages; a negative or non-integer value counts as 0.
 fn lenient_count<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
     let value = serde_yaml::Value::deserialize(deserializer)?;
     Ok(value.as_u64().unwrap_or(0))

@@ -1,17 +1,17 @@
-//! The messages that a late joiner at some time of the recording would have been given, and the static transforms that
-//! the log brings later.
+//! Latched messages for late joiners at a time of the recording, and static transforms recorded
+//! later.
 
 use std::collections::VecDeque;
 
 use super::{PlayedTopic, wanted};
 use crate::{BagMessage, BagReader, TopicInfo, storage::Filter, topic::STATIC_DEPTH};
 
-/// Messages kept of one topic.
+/// Limit of messages kept per topic.
 const MAX_PER_TOPIC: u64 = 1000;
-/// Size of all kept messages, bytes; beyond it the oldest go, but for the last one of each topic.
+/// Limit of kept message bytes; beyond it the oldest are dropped, except the last one of each topic.
 const MAX_BYTES: usize = 256 << 20;
 
-/// Number of the last messages of a topic that its publishers kept together.
+/// Number of messages that the publishers of a topic kept for late joiners.
 fn kept(topic: &TopicInfo) -> usize {
     let latched = topic.offered_qos.iter().filter(|qos| qos.latched);
     let depths = latched.map(|qos| match qos.keep_all {
@@ -26,9 +26,9 @@ fn kept(topic: &TopicInfo) -> usize {
     usize::try_from(total.clamp(least, MAX_PER_TOPIC)).unwrap_or(1)
 }
 
-/// The first messages of static transforms in a log, in order of log time and without those that say the same.
+/// First messages of static transforms in a log, in order of log time and without duplicates.
 ///
-/// Reads no further than their number by the bag's index.
+/// Reads no further than their number in the bag's index.
 pub(super) fn static_transforms(reader: &BagReader, topics: &[PlayedTopic]) -> Vec<BagMessage> {
     let is_static = |topic: &&PlayedTopic| topic.info.has_static_transforms();
     let topics: Vec<&PlayedTopic> = topics.iter().filter(is_static).collect();
@@ -43,7 +43,7 @@ pub(super) fn static_transforms(reader: &BagReader, topics: &[PlayedTopic]) -> V
     };
     let mut found: Vec<BagMessage> = Vec::new();
     let count = usize::try_from(count).unwrap_or(usize::MAX);
-    // Damage is told of where it is played.
+    // Damage is reported when it is played.
     for message in reader.filtered(filter).take(count).map_while(Result::ok) {
         let is_new =
             |known: &BagMessage| known.topic != message.topic || known.data != message.data;
@@ -54,8 +54,8 @@ pub(super) fn static_transforms(reader: &BagReader, topics: &[PlayedTopic]) -> V
     found
 }
 
-/// Messages for a late joiner at a time: first static transforms that come later, the earliest last, so that of one
-/// frame the value holds that is next in the log; then those and all other latched messages before that time.
+/// Messages for a late joiner at a time: later static transforms first, the earliest last, so that each
+/// frame has the next value in the log; then those and all other latched messages before that time.
 pub(super) fn given_at(
     reader: &BagReader,
     topics: &[PlayedTopic],
@@ -74,7 +74,7 @@ pub(super) fn given_at(
     later.into_iter().chain(before).collect()
 }
 
-/// The latched messages of `topics` before `before_ns`, in order of log time.
+/// Latched messages of `topics` before `before_ns`, in order of log time.
 fn latched_before(
     reader: &BagReader,
     topics: &[PlayedTopic],
@@ -100,7 +100,7 @@ fn latched_before(
     let mut kept_messages: VecDeque<BagMessage> = VecDeque::new();
     let mut bytes = 0_usize;
     for message in reader.filtered(filter) {
-        // Damage is told of where it is played; it may lie behind this time.
+        // Damage is reported when it is played; it may be after this time.
         let Ok(message) = message else { break };
         let Some(topic) = latched
             .iter()
@@ -127,7 +127,7 @@ fn latched_before(
     kept_messages
 }
 
-/// Drops the oldest message of a topic; the result is its size, bytes.
+/// Drops the oldest message of a topic; returns its size, bytes.
 fn drop_oldest(messages: &mut VecDeque<BagMessage>, topic: usize) -> usize {
     let oldest = messages.iter().position(|m| m.topic == topic);
     oldest

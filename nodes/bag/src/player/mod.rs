@@ -1,6 +1,6 @@
 //! Playback of a bag as a state machine without I/O and without a clock: the caller owns both.
 //!
-//! All playback times are ns of the caller's own clock since it made the player. The caller asks
+//! All playback times are ns of the caller's clock since the creation of the player. The caller queries
 //! [`Player::due_ns`], waits, and takes [`Player::next`].
 
 mod latched;
@@ -17,10 +17,10 @@ pub use options::{PlayedTopic, PlayerOptions};
 use options::{RATES, ns_from_s};
 use timeline::Timeline;
 
-/// The shortest time from one start to the next in a loop, ns; a bag may hold a single message.
+/// Shortest period of a loop, ns; a bag may contain a single message.
 const MIN_LOOP_NS: i64 = 100_000_000;
 
-/// A step of playback.
+/// A playback step.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Step {
     /// Publish a message.
@@ -32,9 +32,9 @@ pub enum Step {
     },
     /// Publish this time on `/clock`, ns since the Unix epoch.
     Clock(i64),
-    /// The bag starts again: time jumps back.
+    /// The bag restarts: time jumps back.
     Looped,
-    /// Nothing is left.
+    /// End of the playback.
     End,
 }
 
@@ -45,28 +45,28 @@ pub struct Player {
     loops: bool,
     /// First log time played.
     start_ns: i64,
-    /// First log time no longer played.
+    /// End of the played log time, exclusive.
     end_ns: Option<i64>,
     timeline: Timeline,
     /// Static transforms of the whole log.
     statics: Vec<BagMessage>,
     latched: VecDeque<BagMessage>,
-    /// Bag time at which this pass began.
+    /// Bag time at the start of this pass.
     pass_start_ns: i64,
     messages: Option<Messages>,
     head: Option<BagMessage>,
-    /// The error that ended reading, for after all before it is played.
+    /// The error that ended reading, reported after the messages before it.
     failed: Option<BagError>,
-    /// Log time of the last message taken in this pass.
+    /// Log time of the last message of this pass.
     last_ns: Option<i64>,
     clock_period_ns: Option<i64>,
-    /// Playback time at which `/clock` is next due.
+    /// Playback time of the next `/clock` message.
     clock_due_ns: i64,
     ended: bool,
 }
 
 impl Player {
-    /// Prepares to play. Reads static transforms, and what latched topics published before the start.
+    /// Prepares the playback. Reads static transforms, and latched messages from before the start.
     pub fn new(reader: BagReader, options: PlayerOptions) -> Result<Player, BagError> {
         options.check()?;
         let topics = options.topics(&reader)?;
@@ -75,7 +75,7 @@ impl Player {
         if let Some(last_ns) = reader.end_ns().filter(|last_ns| start_ns > *last_ns) {
             let length_s = last_ns.saturating_sub(first_ns) as f64 / 1e9;
             let reason = format!(
-                "{} s is beyond the end of the bag, which takes {length_s} s",
+                "{} s is beyond the duration of the bag, {length_s} s",
                 options.start_offset_s
             );
             return Err(BagError::invalid("start_offset_s", reason));
@@ -108,27 +108,27 @@ impl Player {
         Ok(player)
     }
 
-    /// The topics that are played.
+    /// Played topics.
     pub fn topics(&self) -> &[PlayedTopic] {
         &self.topics
     }
 
-    /// The bag's time at playback time `now_ns`, ns since the Unix epoch.
+    /// Bag time at playback time `now_ns`, ns since the Unix epoch.
     pub fn bag_time_ns(&self, now_ns: i64) -> i64 {
         self.timeline.bag_at(now_ns)
     }
 
-    /// The playback time at which the next step is due.
+    /// Playback time of the next step.
     pub fn due_ns(&self) -> i64 {
         self.clock_due()
             .or_else(|| self.message_due_ns())
             .unwrap_or_else(|| self.pass_end_ns())
     }
 
-    /// The next step, whether due or not.
+    /// Next step, whether due or not.
     #[expect(
         clippy::should_implement_trait,
-        reason = "it can fail, and goes on after the end"
+        reason = "it is fallible, and continues after the end"
     )]
     pub fn next(&mut self) -> Result<Step, BagError> {
         if self.ended {
@@ -165,7 +165,7 @@ impl Player {
         self.timeline.rate()
     }
 
-    /// Goes on at another rate from playback time `now_ns`. False: not from 0.001 to 1000.
+    /// Changes the rate from playback time `now_ns`. False: outside 0.001..=1000.
     pub fn set_rate(&mut self, now_ns: i64, rate: f64) -> bool {
         let possible = RATES.contains(&rate);
         if possible {
@@ -174,8 +174,8 @@ impl Player {
         possible
     }
 
-    /// Goes on at another time of the bag, with what its latched topics published before, and static transforms that
-    /// come later. False: not a time that is played.
+    /// Continues at another time of the bag, with latched messages from before it, and later static
+    /// transforms. False: outside the played range.
     pub fn seek(&mut self, now_ns: i64, bag_ns: i64) -> Result<bool, BagError> {
         let (first_ns, last_ns) = (self.reader.start_ns(), self.reader.end_ns());
         let last_ns = last_ns.into_iter().chain(self.end_ns).min();
@@ -191,14 +191,14 @@ impl Player {
         Ok(is_played)
     }
 
-    /// Plays nothing of the bag from a time on, or all of it; counts from the next seek on. Gives the end
-    /// that was.
+    /// Sets or removes the end of the playback, from the next seek on. Returns the previous
+    /// end.
     pub fn end_at(&mut self, end_ns: Option<i64>) -> Option<i64> {
         std::mem::replace(&mut self.end_ns, end_ns)
     }
 
-    /// The next message, index of its topic and data, ahead of its time: the bag's time jumps there.
-    /// None: nothing is left.
+    /// Next message, with the index of its topic, ahead of its time: the bag time jumps to it.
+    /// `None`: no message is left.
     pub fn skip_to_next(&mut self, now_ns: i64) -> Result<Option<(usize, Vec<u8>)>, BagError> {
         loop {
             let latched_ns = self.latched.front().map(|_| self.pass_start_ns);
@@ -244,14 +244,14 @@ impl Player {
         }
     }
 
-    /// Playback time at which the clock is due, if that is before the next message.
+    /// Playback time of the next clock message, if it precedes the next message.
     fn clock_due(&self) -> Option<i64> {
         let message_ns = self.message_due_ns()?;
         (self.clock_period_ns.is_some() && self.clock_due_ns <= message_ns)
             .then_some(self.clock_due_ns)
     }
 
-    /// Playback time at which the pass is over.
+    /// Playback time of the end of the pass.
     fn pass_end_ns(&self) -> i64 {
         self.timeline
             .playback_at(self.last_ns.unwrap_or(self.pass_start_ns))
@@ -262,7 +262,7 @@ impl Player {
             self.ended = true;
             return Err(error);
         }
-        // A whole pass without messages would loop for ever without a step of time.
+        // A whole pass without messages would loop without a step of time.
         if !self.loops || self.last_ns.is_none() && self.pass_start_ns == self.start_ns {
             self.ended = true;
             return Ok(Step::End);
@@ -276,7 +276,7 @@ impl Player {
     }
 }
 
-/// The played topics, by index of the reader's.
+/// Selected topics, by index of the reader.
 fn wanted<'a>(reader: &BagReader, played: impl IntoIterator<Item = &'a PlayedTopic>) -> Vec<bool> {
     let mut wanted = vec![false; reader.topics().len()];
     for topic in played {

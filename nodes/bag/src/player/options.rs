@@ -1,28 +1,28 @@
-//! Options of playback: topics, rate, range and clock.
+//! Playback options: topics, rate, range and clock.
 
 use crate::{BagError, BagReader, TopicInfo};
 
-/// Slowest and fastest playback.
+/// Allowed playback rates.
 pub(super) const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
-/// Highest frequency of `/clock`, Hz.
+/// Largest rate of `/clock`, Hz.
 const MAX_CLOCK_HZ: f64 = 10_000.0;
 
-/// Options of playback.
+/// Playback options.
 #[derive(Clone, Debug)]
 pub struct PlayerOptions {
     /// Bag seconds per second, 0.001 to 1000.
     pub rate: f64,
-    /// Start, s after the first message.
+    /// Start offset from the first message, s.
     pub start_offset_s: f64,
-    /// Length, s of the bag; to its end where nothing.
+    /// Duration in bag time, s; `None`: to its end.
     pub duration_s: Option<f64>,
-    /// Starts again at the end.
+    /// True to restart at the end.
     pub loop_: bool,
-    /// Names of the topics to play; all where nothing.
+    /// Names of the topics to play; `None`: all.
     pub include: Option<Vec<String>>,
     /// Names of topics not to play.
     pub exclude: Vec<String>,
-    /// Rate of `/clock`, per second of the caller; never where nothing.
+    /// Rate of `/clock`, Hz of the caller's clock; `None`: never.
     pub clock_hz: Option<f64>,
 }
 
@@ -40,25 +40,25 @@ impl Default for PlayerOptions {
     }
 }
 
-/// A topic that is played.
+/// A played topic.
 #[derive(Clone, Debug)]
 pub struct PlayedTopic {
     /// Index into the reader's topics.
     pub bag_topic: usize,
-    /// The topic as the bag has it.
+    /// Topic of the bag.
     pub info: TopicInfo,
 }
 
 impl PlayerOptions {
     pub(super) fn check(&self) -> Result<(), BagError> {
         if !RATES.contains(&self.rate) {
-            let reason = format!("{}; 0.001 to 1000 is accepted", self.rate);
+            let reason = format!("{} is outside 0.001..=1000", self.rate);
             return Err(BagError::invalid("rate", reason));
         }
         let seconds = |name, value: f64| match value.is_finite() && (0.0..=1e9).contains(&value) {
             true => Ok(()),
             false => {
-                let reason = format!("{value} s; 0 to 1e9 s are accepted");
+                let reason = format!("{value} s is outside 0..=1e9 s");
                 Err(BagError::invalid(name, reason))
             }
         };
@@ -68,13 +68,13 @@ impl PlayerOptions {
         match self.clock_hz {
             Some(hz) if !(hz > 0.0 && hz <= MAX_CLOCK_HZ) => Err(BagError::invalid(
                 "clock_hz",
-                format!("{hz} Hz; more than 0 and at most {MAX_CLOCK_HZ} Hz are accepted"),
+                format!("{hz} Hz is not above 0 and at most {MAX_CLOCK_HZ} Hz"),
             )),
             _ => Ok(()),
         }
     }
 
-    /// The topics to play; those that are not in CDR of a known type are left out.
+    /// Topics to play; topics that are not CDR of a known type are skipped.
     pub(super) fn topics(&self, reader: &BagReader) -> Result<Vec<PlayedTopic>, BagError> {
         reader.expect_topics(self.include.as_deref().unwrap_or_default())?;
         reader.expect_topics(&self.exclude)?;
@@ -90,7 +90,7 @@ impl PlayerOptions {
             if info.serialization_format != "cdr" || info.type_name.is_empty() {
                 let (name, format) = (&info.name, &info.serialization_format);
                 log::warn!(
-                    "{name} is left out: its messages are {format:?}, not CDR of a known type"
+                    "{name} is skipped: its messages are {format:?}, not CDR of a known type"
                 );
                 continue;
             }
@@ -103,7 +103,7 @@ impl PlayerOptions {
     }
 }
 
-/// Seconds checked before, in nanoseconds.
+/// Validated seconds, in nanoseconds.
 pub(super) fn ns_from_s(seconds: f64) -> i64 {
     (seconds * 1e9).round() as i64
 }

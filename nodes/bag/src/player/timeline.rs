@@ -1,6 +1,6 @@
-//! The line between the caller's clock and the time of the bag.
+//! Mapping between the caller's clock and bag time.
 
-/// A line through (playback time, bag time) with the rate as its slope; all times in ns.
+/// Line through (playback time, bag time) with the rate as its slope; all times in ns.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Timeline {
     playback_ns: i64,
@@ -17,14 +17,14 @@ impl Timeline {
         }
     }
 
-    /// The playback time at which `bag_ns` is due.
+    /// Playback time of the bag time `bag_ns`.
     pub(super) fn playback_at(&self, bag_ns: i64) -> i64 {
         let ahead_ns = bag_ns.saturating_sub(self.bag_ns);
         self.playback_ns
             .saturating_add(scaled(ahead_ns, self.rate.recip()))
     }
 
-    /// The bag time at `playback_ns`.
+    /// Bag time at the playback time `playback_ns`.
     pub(super) fn bag_at(&self, playback_ns: i64) -> i64 {
         let ahead_ns = playback_ns.saturating_sub(self.playback_ns);
         self.bag_ns.saturating_add(scaled(ahead_ns, self.rate))
@@ -34,20 +34,20 @@ impl Timeline {
         self.rate
     }
 
-    /// Goes on at another rate from `playback_ns`.
+    /// Changes the rate from `playback_ns` on.
     pub(super) fn set_rate(&mut self, playback_ns: i64, rate: f64) {
         self.anchor(playback_ns, self.bag_at(playback_ns));
         self.rate = rate;
     }
 
-    /// Lays the line anew through this pair.
+    /// Sets the line through this pair.
     pub(super) fn anchor(&mut self, playback_ns: i64, bag_ns: i64) {
         self.playback_ns = playback_ns;
         self.bag_ns = bag_ns;
     }
 }
 
-/// Exact at factor 1; otherwise rounded, saturating.
+/// Scaled duration, exact at factor 1; otherwise rounded, saturating.
 fn scaled(ns: i64, factor: f64) -> i64 {
     if factor == 1.0 {
         return ns;

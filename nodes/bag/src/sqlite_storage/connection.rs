@@ -1,4 +1,4 @@
-//! Connections to SQLite files that write nothing beside them, and a check of the file's size.
+//! Read-only SQLite connections that create no files, and a check of the file size.
 
 use std::{
     fs::File,
@@ -12,19 +12,19 @@ use tempfile::{Builder, TempPath};
 
 use crate::{BagError, sniff::SQLITE_MAGIC};
 
-/// Strictness of SQLite towards a file.
+/// Strictness of SQLite with a file.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Access {
-    /// Refuses pages whose cells do not fit.
+    /// Rejects pages with invalid cells.
     Strict,
-    /// Reads the pages that are there of a database that is shorter than its header says.
+    /// Reads the existing pages of a truncated database.
     Cut,
-    /// Reads of each page, also of a cut database, the cells that fit.
+    /// Reads the valid cells of each page, in truncated databases too.
     Damaged,
 }
 
-/// Opens read-only. `immutable` keeps SQLite from creating files beside the database, so that a
-/// read-only folder works; it would hide rows still in a write-ahead log, so not where one exists.
+/// Opens read-only. `immutable` keeps SQLite from creating files beside the database, so that read-only
+/// folders work. It would hide rows in a write-ahead log, so it is not used if one exists.
 pub(super) fn connect(path: &Path, access: Access) -> Result<Connection, BagError> {
     let path = &std::path::absolute(path).map_err(BagError::io(path, "locate"))?;
     let has_wal = has_wal(path);
@@ -48,8 +48,8 @@ pub(super) fn connect(path: &Path, access: Access) -> Result<Connection, BagErro
     };
     let connection = Connection::open_with_flags(uri, flags).map_err(wrong)?;
     for (setting, on) in [
-        // SQLite refuses a database that is shorter than its header says, unless its schema may be
-        // written, which does not go with the other; read-only it is anyway.
+        // SQLite rejects a truncated database unless its schema is writable, which excludes
+        // defensive mode; the connection is read-only anyway.
         (DbConfig::SQLITE_DBCONFIG_DEFENSIVE, !cut),
         (DbConfig::SQLITE_DBCONFIG_WRITABLE_SCHEMA, cut),
         (DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false),
@@ -70,15 +70,15 @@ pub(super) fn connect(path: &Path, access: Access) -> Result<Connection, BagErro
     Ok(connection)
 }
 
-/// True where a write-ahead log lies beside the database: SQLite appends "-wal" to the whole name.
+/// True if a write-ahead log exists: SQLite appends "-wal" to the whole name.
 fn has_wal(path: &Path) -> bool {
     let mut name = path.as_os_str().to_owned();
     name.push("-wal");
     Path::new(&name).metadata().is_ok_and(|wal| wal.len() > 0)
 }
 
-/// True where the write-ahead log makes a whole database of the file: a writer that is stopped while it
-/// copies the log leaves the first page, which counts pages that only the log holds.
+/// True if the write-ahead log completes the database: a writer stopped during a checkpoint
+/// leaves a first page that counts pages of the log.
 fn wal_completes(path: &Path) -> bool {
     let opens = |connection: Connection| {
         let count = "SELECT COUNT(*) FROM sqlite_master";
@@ -99,15 +99,15 @@ fn percent_encode(path: &Path) -> String {
         .collect()
 }
 
-/// A database of which pages are missing.
+/// A truncated database.
 pub(super) struct Cut {
     pub damage: BagError,
-    /// Bytes of the pages that are whole; of another one SQLite would read what is missing as zeros.
+    /// Size of the complete pages; SQLite would read an incomplete one as zeros, bytes.
     pub whole_bytes: u64,
 }
 
 impl Cut {
-    /// A copy of the whole pages.
+    /// Copies the complete pages.
     pub(super) fn whole_pages(&self, path: &Path) -> Result<Arc<TempPath>, BagError> {
         let copy = || -> io::Result<TempPath> {
             let mut copy = Builder::new().prefix("lattice_bag_").tempfile()?;
@@ -121,7 +121,7 @@ impl Cut {
     }
 }
 
-/// A copy whose magic is right, of a file whose magic is not.
+/// Copy with the correct magic, of a file with a wrong one.
 pub(super) fn mended_magic(path: &Path) -> Result<Option<Arc<TempPath>>, BagError> {
     let mut file = File::open(path).map_err(BagError::io(path, "open"))?;
     let mut magic = Vec::new();
@@ -173,7 +173,7 @@ pub(super) fn missing_pages(path: &Path) -> Result<Option<Cut>, BagError> {
         1 => 65_536,
         bytes => u64::from(bytes),
     };
-    // The count holds only where the version it is valid for equals the change counter.
+    // The count is valid only if its version equals the change counter.
     let pages = if word(24) == word(92) {
         u64::from(word(28))
     } else {

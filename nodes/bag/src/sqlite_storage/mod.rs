@@ -1,4 +1,4 @@
-//! SQLite storage files of every rosbag2 schema, opened so that nothing beside them is written.
+//! SQLite storage files of every rosbag2 schema, opened without writing files beside them.
 
 mod connection;
 mod salvage;
@@ -23,21 +23,21 @@ use connection::{Access, connect, mended_magic, missing_pages};
 use salvage::{Salvaged, salvage};
 use stream::{IMPLAUSIBLE, Key, SqliteStream};
 
-/// More topics than this are refused.
+/// Limit of topics.
 const MAX_TOPICS: usize = 65_536;
-/// Topics that are asked for one by one where their table is damaged.
+/// Limit of topics queried individually in a damaged table.
 const MAX_DAMAGED_TOPICS: i64 = 4096;
 
-/// A SQLite file whose contents are known.
+/// An indexed SQLite file.
 pub(crate) struct SqliteFile {
     path: PathBuf,
     temporary: Option<Arc<TempPath>>,
     topic_of: Arc<BTreeMap<i64, usize>>,
-    /// The readable messages in order of time, where damage keeps the database from ordering them.
+    /// Readable messages in order of time, if damage prevents ordering by the database.
     rescued: Option<Arc<Vec<Key>>>,
-    /// Index of the times, where there is one.
+    /// Name of the index of times, if any.
     time_index: Option<String>,
-    /// The file is shorter than its header says.
+    /// True for a truncated file.
     cut: bool,
     salvaged: OnceLock<Arc<Salvaged>>,
     pub(crate) info: StorageInfo,
@@ -89,18 +89,18 @@ impl SqliteFile {
         Ok(file)
     }
 
-    /// The wanted messages in order of log time.
+    /// Selected messages in order of log time.
     pub(crate) fn stream(&self, filter: Filter) -> Result<StorageStream, BagError> {
         Ok(Box::new(SqliteStream::new(self, filter)?))
     }
 
-    /// Messages that the file held, if the rows or their index tell.
+    /// Number of messages in the file, if known from the rows or their index.
     pub(crate) fn claimed(&self) -> Option<u64> {
         let connection = connect(&self.path, self.access(true)).ok()?;
         self.salvaged(&connection).claimed()
     }
 
-    /// Messages that can be read behind damage, searched for once.
+    /// Readable messages after damage, searched once.
     fn salvaged(&self, connection: &Connection) -> Arc<Salvaged> {
         let search = || {
             let bytes = fs::metadata(&self.path).map_or(0, |examined| examined.len());
@@ -136,7 +136,7 @@ impl SqliteFile {
         let definitions = self
             .definitions(connection, &tables)
             .unwrap_or_else(|error| {
-                log::warn!("{error}; its topics are taken without definitions");
+                log::warn!("{error}; its topics have no definitions");
                 BTreeMap::new()
             });
         let wrong = |e| BagError::sqlite(&self.path, "table topics", e);
@@ -173,7 +173,7 @@ impl SqliteFile {
             statement.query_map([first, last], named)?.collect()
         };
         let rows = read(i64::MIN, i64::MAX).or_else(|error| {
-            // One by one: rosbag2 counts them from one.
+            // Individually: rosbag2 numbers them from one.
             let each = (1..=MAX_DAMAGED_TOPICS).filter_map(|id| read(id, id).ok());
             let found: Vec<_> = each.flatten().collect();
             match found.is_empty() {

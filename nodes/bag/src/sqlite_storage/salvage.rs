@@ -1,4 +1,4 @@
-//! Rows of a damaged SQLite file: scanned from both ends to the damage, and asked for one by one within it.
+//! Recovery of rows from a damaged SQLite file: scans from both ends to the damage, and individual queries within it.
 
 use std::path::Path;
 
@@ -7,27 +7,27 @@ use rusqlite::Connection;
 use super::stream::{KEY_COLUMNS, Key, key};
 use crate::BagError;
 
-/// Shortest row of a message: pointer to its cell (2), lengths of payload and row (2), record header (5),
-/// topic (1), time (8) and the CDR header (4), bytes. A file has no more rows than this allows.
+/// Smallest message row: cell pointer (2), payload and row lengths (2), record header (5),
+/// topic (1), time (8) and CDR header (4), bytes. It bounds the number of rows by the file size.
 const MIN_ROW_BYTES: u64 = 22;
-/// Keys are at most this many.
+/// Limit of keys.
 const MAX_KEYS: usize = 1 << 26;
-/// Stretches of lost rows that are listed; others are counted with the last one.
+/// Limit of listed gaps; further ones are merged into the last.
 const MAX_STRETCHES: usize = 1000;
 
-/// Readable rows of the table of messages.
+/// Readable rows of the message table.
 #[derive(Default)]
 pub(super) struct Salvaged {
-    /// In order of time.
+    /// Keys in order of time.
     pub keys: Vec<Key>,
-    /// Rows that are there and cannot be read: first, last and number.
+    /// Unreadable rows: first, last and number.
     pub lost: Vec<(i64, i64, u64)>,
-    /// True if the row ids of the table's end are known.
+    /// True if the last row id of the table is known.
     pub ends: bool,
 }
 
 impl Salvaged {
-    /// Messages that the file held, where its last row is known.
+    /// Number of messages in the file, if its last row is known.
     pub(super) fn claimed(&self) -> Option<u64> {
         let lost = self.lost.iter().map(|(_, _, count)| count).sum::<u64>();
         self.ends
@@ -57,7 +57,7 @@ impl Salvaged {
     }
 }
 
-/// The rows of a file of `file_bytes`, whose index of times has this name.
+/// Recovers the rows of a file of `file_bytes` with this index of times.
 pub(super) fn salvage(
     connection: &Connection,
     time_index: Option<&str>,
@@ -79,7 +79,7 @@ pub(super) fn salvage(
     }
     keys.sort_unstable_by_key(|key| key.id);
     keys.dedup_by_key(|key| key.id);
-    // The index has its own pages.
+    // The index has separate pages.
     let mut listed = Vec::new();
     if let Some(index) = time_index {
         let index = index.replace('"', "\"\"");
@@ -113,12 +113,12 @@ pub(super) fn salvage(
     salvaged
 }
 
-/// The keys without those whose row id is out of order, which nobody finds by it; and whether there were none.
+/// Keys in ascending order of row id, and whether all were: others cannot be found by their row id.
 fn ascending(keys: Vec<Key>) -> (Vec<Key>, bool) {
     let count = keys.len();
     let mut ordered: Vec<Key> = Vec::with_capacity(count);
     for key in keys {
-        // Where two contradict each other, the one that fits what precedes both stays.
+        // Of two contradicting keys, the one consistent with the previous keys stays.
         if ordered.last().is_some_and(|last| last.id >= key.id) {
             let before = ordered.iter().rev().nth(1).map_or(i64::MIN, |key| key.id);
             if key.id <= before {
@@ -132,7 +132,7 @@ fn ascending(keys: Vec<Key>) -> (Vec<Key>, bool) {
     (ordered, all)
 }
 
-/// Asks for the rows that the scans did not find: those that the index lists, and between the first and the
+/// Queries rows missed by the scans: those listed in the index, and those between the first and the
 /// last where a scan met damage.
 fn fill(
     connection: &Connection,
@@ -160,7 +160,7 @@ fn fill(
         missing.for_each(|id| ask(id, salvaged));
         return found;
     }
-    // Rows count from one; those of a file that goes on from another may begin higher.
+    // Rows count from one; a continued file may begin with a higher number.
     let known = keys.iter().map(|key| key.id).chain(listed.iter().copied());
     let lowest = known.clone().min().unwrap_or(1);
     let first = if (1..=most).contains(&lowest) {

@@ -1,4 +1,4 @@
-//! Messages of a SQLite file in order of log time, a page of keys at a time.
+//! Messages of an SQLite file in order of log time, in pages of keys.
 
 use std::{collections::BTreeMap, collections::VecDeque, path::PathBuf, sync::Arc};
 
@@ -11,13 +11,13 @@ use crate::{
     storage::{Filter, StorageMessage},
 };
 
-/// Keys fetched at once; more where each fetch has to sort the whole table.
+/// Keys per query; more if each query has to sort the whole table.
 const PAGE_KEYS: usize = 4096;
 const PAGE_KEYS_UNSORTED: usize = 1 << 20;
-/// Rescued keys are at most this many.
+/// Limit of recovered keys.
 const MAX_RESCUED_KEYS: usize = 1 << 26;
 
-/// Key of a message; sorts by time, then by row.
+/// Key of a message, ordered by time, then by row.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) struct Key {
     pub timestamp_ns: i64,
@@ -26,10 +26,10 @@ pub(super) struct Key {
     size_bytes: u64,
 }
 
-/// A topic that is no number is none.
+/// Columns of a key; a topic id that is not a number becomes -1.
 pub(super) const KEY_COLUMNS: &str =
     "SELECT timestamp, id, COALESCE(CAST(topic_id AS INTEGER), -1), octet_length(data)";
-/// Condition of a row that is no message; shorter than a CDR header none is.
+/// Condition for an invalid message row, such as data shorter than a CDR header.
 pub(super) const IMPLAUSIBLE: &str = "typeof(timestamp) <> 'integer' OR timestamp < 0 OR octet_length(data) IS NULL OR octet_length(data) < 4";
 
 pub(super) fn key(row: &rusqlite::Row<'_>) -> Result<Key, rusqlite::Error> {
@@ -44,7 +44,7 @@ pub(super) fn key(row: &rusqlite::Row<'_>) -> Result<Key, rusqlite::Error> {
     })
 }
 
-/// The keys of all rows before the first one that cannot be read.
+/// Keys of all rows before the first unreadable one.
 pub(super) fn readable_keys(connection: &Connection) -> Vec<Key> {
     let select = format!("{KEY_COLUMNS} FROM messages NOT INDEXED ORDER BY id");
     let Ok(mut statement) = connection.prepare(&select) else {
@@ -64,7 +64,7 @@ pub(super) struct SqliteStream {
     topic_of: Arc<BTreeMap<i64, usize>>,
     filter: Filter,
     keys: VecDeque<Key>,
-    /// The last key of the page before.
+    /// Last key of the previous page.
     after: Option<(i64, i64)>,
     page_keys: usize,
     messages_read: u64,
@@ -101,7 +101,7 @@ impl SqliteStream {
                 .filter(|key| stream.wants(key))
                 .copied()
                 .collect();
-            // All there is: no page follows.
+            // All keys are present: no page follows.
             stream.page_keys = 0;
         }
         Ok(stream)
@@ -113,7 +113,7 @@ impl SqliteStream {
         topic.is_some_and(|topic| self.filter.wants(*topic, key.timestamp_ns))
     }
 
-    /// Fetches keys until some are wanted or none are left.
+    /// Fetches keys until some are selected or none are left.
     fn fetch_keys(&mut self) -> Result<(), BagError> {
         let select = format!(
             "{KEY_COLUMNS} FROM messages WHERE timestamp >= ?1 AND (timestamp, id) > (?1, ?2) AND timestamp <= ?3 \
@@ -126,7 +126,7 @@ impl SqliteStream {
             let last_ns = end_ns.map_or(i64::MAX, |end_ns| end_ns.saturating_sub(1));
             let page: Vec<Key> = {
                 let mut statement = self.connection.prepare_cached(&select).map_err(wrong)?;
-                // Before the first page every row of the start time is due, whatever its id.
+                // Before the first page every row of the start time matches, with any id.
                 let (time_ns, id) = self.after.unwrap_or((self.filter.start_ns, i64::MIN));
                 let limit = i64::try_from(self.page_keys).unwrap_or(i64::MAX);
                 let rows = statement

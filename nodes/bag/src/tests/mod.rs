@@ -294,7 +294,7 @@ fn only_bags_are_overwritten() {
     fs::write(&others, "not of this bag").unwrap();
     assert!(refused(&bag, true).contains("years_of_work.db3"));
     fs::write(bag.join("metadata.yaml"), "not of a bag").unwrap();
-    assert!(refused(&bag, true).contains("no bag can be made out"));
+    assert!(refused(&bag, true).contains("not recognised as a bag"));
     fs::remove_file(bag.join("metadata.yaml")).unwrap();
     refused(&bag, true);
     assert!(others.exists() && bag.join("bag_0.db3").exists());

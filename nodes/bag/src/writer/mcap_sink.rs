@@ -1,4 +1,4 @@
-//! Writes MCAP files of profile "ros2".
+//! MCAP writer with the profile "ros2".
 
 use std::{
     collections::BTreeMap,
@@ -26,7 +26,7 @@ impl McapSink {
             .profile("ros2")
             .library(concat!("lattice ", env!("CARGO_PKG_VERSION")))
             .compression(None)
-            // Chunks go to the file whole: a process that is killed leaves none that ends early.
+            // Chunks are written as a whole: a killed process leaves no truncated one.
             .disable_seeking(true)
             .create(BufWriter::new(file))?;
         Ok(McapSink {

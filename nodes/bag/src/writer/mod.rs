@@ -22,19 +22,19 @@ use parts::{Part, Written, ZSTD_LEVEL, described};
 use place::make_way;
 pub use place::replaceable;
 
-/// Name of the distribution in the metadata.
+/// Distribution name in the metadata.
 const ROS_DISTRO: &str = "lattice";
-/// Bytes of the CDR encapsulation header.
+/// Length of the CDR encapsulation header.
 const ENCAPSULATION_BYTES: usize = 4;
 
-/// Options of writing a bag.
+/// Options of a bag writer.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WriterOptions {
-    /// Replaces a bag at the same path.
+    /// True to replace a bag at the same path.
     pub overwrite: bool,
-    /// A new storage file begins when one holds so many bytes of messages.
+    /// Message bytes after which a new storage file begins.
     pub max_file_bytes: Option<u64>,
-    /// A new storage file begins when the messages of one span so long, ns.
+    /// Time span of messages after which a new storage file begins, ns.
     pub max_file_ns: Option<i64>,
     /// Compression with zstd.
     pub compression: Compression,
@@ -48,20 +48,20 @@ pub enum Compression {
     None,
     /// Each message.
     Messages,
-    /// Each storage file, when it is complete.
+    /// Each storage file, once complete.
     Files,
 }
 
 /// A topic to write.
 #[derive(Clone, Debug, Default)]
 pub struct TopicSpec {
-    /// The topic's full name, such as "/tf".
+    /// Full topic name, such as "/tf".
     pub name: String,
-    /// The type, such as "tf2_msgs/msg/TFMessage".
+    /// Type, such as "tf2_msgs/msg/TFMessage".
     pub type_name: String,
-    /// Hash of the type, such as "RIHS01_..."; empty where it is unknown.
+    /// Type hash, such as "RIHS01_..."; empty if unknown.
     pub type_hash: String,
-    /// The message definition with all it depends on (ros2msg or ros2idl text).
+    /// Message definition with its dependencies (ros2msg or ros2idl text).
     pub definition: Option<String>,
     /// QoS of the publishers.
     pub offered_qos: Vec<BagQos>,
@@ -69,17 +69,17 @@ pub struct TopicSpec {
 
 type SinkError = Box<dyn Error + Send + Sync>;
 
-/// A storage file being written; topics count from 0 in the order they are added.
+/// Storage file being written; topics count from 0 in the order they are added.
 trait Sink: Send {
     fn add_topic(&mut self, topic: &TopicInfo, qos: &str) -> Result<(), SinkError>;
     fn write(&mut self, topic: usize, log_time_ns: i64, data: &[u8]) -> Result<(), SinkError>;
-    /// Hands everything so far to the system, so that it outlives the process.
+    /// Passes all data to the system, so that they survive the process.
     fn flush(&mut self) -> Result<(), SinkError>;
     fn finish(self: Box<Self>, metadata: &str) -> Result<(), SinkError>;
 }
 
 fn failed(path: &Path, doing: &'static str) -> impl FnOnce(SinkError) -> BagError {
-    // The system's own error tells of a full disk.
+    // The system's own error reports a full disk.
     let system = |error: SinkError| match error.downcast().map(|error| *error) {
         Ok(McapError::Io(error)) => error,
         Ok(other) => io::Error::other(other),
@@ -94,7 +94,7 @@ pub struct BagWriter {
     storage: Storage,
     options: WriterOptions,
     part: Part,
-    /// Storage files that are complete.
+    /// Complete storage files.
     finished: Vec<FileInformation>,
     topics: Vec<TopicInfo>,
     names: HashSet<String>,
@@ -102,7 +102,7 @@ pub struct BagWriter {
 }
 
 impl BagWriter {
-    /// Makes the folder `path` and the storage file in it.
+    /// Creates the folder `path` and its first storage file.
     pub fn create(
         path: &Path,
         storage: Storage,
@@ -126,7 +126,7 @@ impl BagWriter {
         })
     }
 
-    /// Announces a topic; the result is what [`BagWriter::write`] takes.
+    /// Adds a topic; the result is the argument of [`BagWriter::write`].
     pub fn add_topic(&mut self, topic: TopicSpec) -> Result<usize, BagError> {
         let wrong = |reason: String| Err(BagError::invalid("topic", reason));
         if !topic.name.starts_with('/') || topic.name.len() < 2 {
@@ -143,7 +143,7 @@ impl BagWriter {
             ));
         }
         if self.names.contains(&topic.name) {
-            return wrong(format!("{} was added before", topic.name));
+            return wrong(format!("{} is added twice", topic.name));
         }
         let info = TopicInfo {
             name: topic.name,
@@ -173,7 +173,7 @@ impl BagWriter {
         if log_time_ns < 0 {
             return wrong(
                 "log_time_ns",
-                format!("{log_time_ns} is before 1970, which bags cannot hold"),
+                format!("{log_time_ns} is before 1970, which bags do not support"),
             );
         }
         let size = cdr.len();
@@ -181,7 +181,7 @@ impl BagWriter {
             return wrong(
                 "message",
                 format!(
-                    "{size} bytes on {}; 4 to {MAX_MESSAGE_BYTES} are accepted",
+                    "{size} bytes on {} is outside 4..={MAX_MESSAGE_BYTES}",
                     info.name
                 ),
             );
@@ -202,7 +202,7 @@ impl BagWriter {
         Ok(())
     }
 
-    /// True if a message of this time belongs into the next storage file.
+    /// True if a message of this time belongs to the next storage file.
     fn is_full(&self, log_time_ns: i64) -> bool {
         let (options, part) = (&self.options, &self.part.written);
         let most_bytes = options.max_file_bytes.unwrap_or(u64::MAX);
@@ -223,7 +223,7 @@ impl BagWriter {
         Ok(())
     }
 
-    /// Hands everything so far to the system: a killed process loses only what came after.
+    /// Passes all data to the system: a killed process loses only later messages.
     pub fn flush(&mut self) -> Result<(), BagError> {
         let flushed = self.part.sink.flush();
         flushed.map_err(failed(&self.part.file, "write"))
@@ -242,7 +242,7 @@ impl BagWriter {
     pub fn finish(self) -> Result<(), BagError> {
         let embedded = self.embedded()?;
         let mut metadata = self.metadata(&self.open_part());
-        // The messages first, then whole metadata: a crash leaves neither without the other.
+        // Messages first, then complete metadata: a crash leaves neither without the other.
         let last = self.part.finish(&embedded, self.options.compression)?;
         if let Some(path) = metadata.relative_file_paths.last_mut() {
             path.clone_from(&last.path);
@@ -271,7 +271,7 @@ impl BagWriter {
         write().map_err(BagError::io(&path, "write"))
     }
 
-    /// The metadata with the storage file that is open.
+    /// Metadata including the open storage file.
     fn metadata(&self, open: &FileInformation) -> Metadata {
         let (starting_time, duration) = self.written.times();
         let files: Vec<_> = self.finished.iter().chain([open]).cloned().collect();

@@ -1,4 +1,4 @@
-//! The storage files of a bag being written, one after the other.
+//! Consecutive storage files of a bag being written.
 
 use std::fs::{self, File};
 use std::io;
@@ -8,10 +8,10 @@ use super::{Compression, Sink, SinkError, failed, mcap_sink::McapSink, sqlite_si
 use crate::metadata::{EMPTY_START_NS, FileInformation, Nanoseconds, StartingTime};
 use crate::{BagError, Storage};
 
-/// Level of zstd for files and messages.
+/// zstd level for files and messages.
 pub(super) const ZSTD_LEVEL: i32 = 1;
 
-/// Number of messages, and their first and last log time.
+/// Number of messages, with first and last log time.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Written {
     pub messages: u64,
@@ -27,7 +27,7 @@ impl Written {
         self.range_ns = Some((first_ns.min(log_time_ns), last_ns.max(log_time_ns)));
     }
 
-    /// Time from the first message to the last, with one more at `log_time_ns`, ns.
+    /// Time span of the messages with one more at `log_time_ns`, ns.
     pub(super) fn span_with(&self, log_time_ns: i64) -> i64 {
         self.range_ns.map_or(0, |(first_ns, last_ns)| {
             last_ns.max(log_time_ns).saturating_sub(first_ns)
@@ -52,7 +52,7 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// Makes the file of a number, which must not be there.
+    /// Creates the file of a number, which must not exist.
     pub(super) fn create(folder: &Path, storage: Storage, number: usize) -> Result<Part, BagError> {
         let name = folder.file_name().unwrap_or_default().to_string_lossy();
         let file = folder.join(format!("{name}_{number}.{}", storage.extension()));
@@ -60,7 +60,7 @@ impl Part {
         let sink: Result<Box<dyn Sink>, SinkError> = match storage {
             Storage::Mcap => McapSink::create(created).map(|sink| Box::new(sink) as _),
             Storage::Sqlite3 => {
-                // Closing it later would drop the locks that SQLite takes on the file.
+                // Closing it later would release the locks that SQLite takes on the file.
                 drop(created);
                 SqliteSink::create(&file).map(|sink| Box::new(sink) as _)
             }
@@ -72,7 +72,7 @@ impl Part {
         })
     }
 
-    /// Brings the file to the disk, compressed if that is wanted; it is described as the metadata does.
+    /// Syncs the file to disk, optionally compressed; returns its metadata entry.
     pub(super) fn finish(
         self,
         metadata: &str,
@@ -90,7 +90,7 @@ impl Part {
     }
 }
 
-/// The entry of a storage file in the metadata.
+/// Metadata entry of a storage file.
 pub(super) fn described(file: &Path, written: &Written) -> FileInformation {
     let (starting_time, duration) = written.times();
     let name = file.file_name().unwrap_or_default();
@@ -102,18 +102,18 @@ pub(super) fn described(file: &Path, written: &Written) -> FileInformation {
     }
 }
 
-/// Replaces a file by one that ends in `.zstd`.
+/// Replaces a file by its compressed form with the extension `.zstd`.
 fn compress(file: &Path) -> io::Result<PathBuf> {
     let mut packed = file.as_os_str().to_owned();
     packed.push(".zstd");
     let packed = PathBuf::from(packed);
-    // Under its name only once it is whole and on the disk, so that one of the two always is.
+    // Renamed only once complete and on disk, so that one of the two always exists.
     let mut part = file.as_os_str().to_owned();
     part.push(".part");
     let part = PathBuf::from(part);
     let mut out = File::create_new(&part)?;
     let mut encoder = zstd::stream::Encoder::new(&mut out, ZSTD_LEVEL)?;
-    // So that a reader sees a byte that has changed.
+    // Lets a reader detect a changed byte.
     encoder.include_checksum(true)?;
     std::io::copy(&mut File::open(file)?, &mut encoder)?;
     encoder.finish()?;

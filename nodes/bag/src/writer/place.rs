@@ -1,4 +1,4 @@
-//! The place of a bag in the file system.
+//! Location of a bag in the file system.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,15 +7,15 @@ use crate::BagError;
 use crate::metadata::Metadata;
 use crate::split_list::{is_storage, list};
 
-/// Removes a bag at `path` if that is wanted; anything else there is kept and refused.
+/// Removes a bag at `path` if `overwrite` is set; anything else there is kept, with an error.
 pub(super) fn make_way(path: &Path, overwrite: bool) -> Result<(), BagError> {
     let mut files = replaceable(path, overwrite, &[])?.into_iter();
     files.try_for_each(|file| fs::remove_file(&file).map_err(BagError::io(&file, "remove")))
 }
 
-/// Files of a bag at `path` that its metadata name, or that are numbered as ours if it has none, which one
-/// that is written there replaces. Refused where that is not wanted, or where something else is there but
-/// for the names `beside`.
+/// Files of a bag at `path` that a new bag replaces: those named in its metadata, or numbered like ours if it has
+/// none. An error if replacing is not allowed, or if anything else is there except
+/// the names `beside`.
 pub fn replaceable(
     path: &Path,
     overwrite: bool,
@@ -39,7 +39,7 @@ pub fn replaceable(
         None => Vec::new(),
         Some(Ok(metadata)) => metadata.relative_file_paths,
         Some(Err(error)) => {
-            return refuse(format!(" and no bag can be made out there ({error})"), "");
+            return refuse(format!(" and is not recognised as a bag ({error})"), "");
         }
     };
     let folder = path.file_name().unwrap_or_default().to_string_lossy();
@@ -47,7 +47,7 @@ pub fn replaceable(
         let endings = ["-wal", "-shm", "-journal"];
         let of_file = endings.iter().find_map(|ending| name.strip_suffix(ending));
         let file = of_file.unwrap_or(name);
-        // Without metadata a writer was killed.
+        // A killed writer leaves no metadata.
         let is_unlisted = || named.is_empty() && is_numbered(file, &folder);
         name == "metadata.yaml" || named.iter().any(|n| n == file) || is_unlisted()
     };
@@ -58,7 +58,7 @@ pub fn replaceable(
             continue;
         }
         if !is_ours(&name) || file.is_dir() {
-            let why = format!(" and holds {name:?}, which is no part of a bag of ours");
+            let why = format!(" and contains {name:?}, which is not part of the bag");
             return refuse(why, "");
         }
         files.push(file);
@@ -69,7 +69,7 @@ pub fn replaceable(
     Ok(files)
 }
 
-/// True for the name of a storage file that a writer makes in a folder of this name.
+/// True for the name of a storage file that a writer creates in a folder of this name.
 fn is_numbered(file: &str, folder: &str) -> bool {
     let number = file
         .strip_prefix(folder)

@@ -1,4 +1,4 @@
-//! Writes SQLite files of schema version 4 (ROS 2 Iron and later).
+//! SQLite writer with schema version 4 (ROS 2 Iron and later).
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -7,7 +7,7 @@ use rusqlite::{Connection, params};
 use super::{ROS_DISTRO, Sink, SinkError};
 use crate::{TopicInfo, metadata::METADATA_VERSION, storage::definition_encoding};
 
-/// A transaction is committed when it holds this much, bytes.
+/// Transaction size before a commit, bytes.
 const TRANSACTION_BYTES: usize = 32 << 20;
 
 const TABLES: &str = "

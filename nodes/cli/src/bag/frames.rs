@@ -1,4 +1,4 @@
-//! Frames that the messages of a log name.
+//! Frames named in the messages of a log.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,15 +6,15 @@ use lattice_bag::{BagError, BagReader, ReadOptions, TopicInfo};
 use lattice_msgs::cdr;
 use lattice_msgs::tf2_msgs::TFMessage;
 
-/// Bounds of what is read of a log.
+/// Limit of messages read of a log.
 const MAX_MESSAGES: usize = 5000;
 const MAX_BYTES: usize = 256 << 20;
-/// Log time that is read at least, so that `/tf` has sent most of its transforms, ns.
+/// Log time that is always read, so that `/tf` has sent most of its transforms, ns.
 const MIN_SPAN_NS: i64 = 1_000_000_000;
-/// Most transforms of a topic.
+/// Limit of transforms per topic.
 const MAX_TRANSFORMS: usize = 200;
 
-/// Frames of a topic, as its first messages have them.
+/// Frames of a topic, from its first messages.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frames {
     /// `frame_id` of the header.
@@ -25,7 +25,7 @@ pub struct Frames {
     pub transforms: BTreeSet<[String; 2]>,
 }
 
-/// Content of a message that names frames.
+/// Frame fields of a message type.
 #[derive(Clone, Copy, PartialEq)]
 enum Content {
     Transforms,
@@ -33,7 +33,7 @@ enum Content {
     Odometry,
 }
 
-/// The frames of each topic by its index, of those topics that name some in the first messages.
+/// Frames of each topic by its index, for topics whose first messages name some.
 pub fn of_log(reader: &BagReader) -> Result<BTreeMap<usize, Frames>, BagError> {
     let content: Vec<_> = reader.topics().iter().map(content).collect();
     let topics = reader.topics().iter().zip(&content);
@@ -49,7 +49,7 @@ pub fn of_log(reader: &BagReader) -> Result<BTreeMap<usize, Frames>, BagError> {
     };
     let (mut bytes, mut begin_ns) = (0_usize, None);
     for message in reader.messages(&options)?.take(MAX_MESSAGES) {
-        // What precedes damage is shown; the log's reader warns of it.
+        // Messages before damage are used; the log's reader warns of it.
         let Ok(message) = message else {
             break;
         };
@@ -68,7 +68,7 @@ pub fn of_log(reader: &BagReader) -> Result<BTreeMap<usize, Frames>, BagError> {
 }
 
 impl Frames {
-    /// Adds what a message names; one that is damaged names nothing.
+    /// Adds the frames of a message; a damaged one adds none.
     fn add(&mut self, content: Content, message: &[u8]) {
         if content == Content::Transforms {
             let edges = cdr::from_slice::<TFMessage>(message).unwrap_or_default();
@@ -88,7 +88,7 @@ impl Frames {
     }
 }
 
-/// Part of a message type that names frames; `None` for images, which are many.
+/// Frame fields of a message type; `None` for images, which are numerous.
 fn content(topic: &TopicInfo) -> Option<Content> {
     match topic.type_name.as_str() {
         "tf2_msgs/msg/TFMessage" => return Some(Content::Transforms),
@@ -101,7 +101,7 @@ fn content(topic: &TopicInfo) -> Option<Content> {
     let mut lines = definition
         .lines()
         .map(|line| line.split('#').next().unwrap_or_default());
-    // Constants are no fields.
+    // Constants are not fields.
     let first = lines.find(|line| !line.trim().is_empty() && !line.contains('='))?;
     let of = first.split_whitespace().next();
     matches!(
@@ -111,7 +111,7 @@ fn content(topic: &TopicInfo) -> Option<Content> {
     .then_some(Content::Header)
 }
 
-/// The first fields of a message in CDR.
+/// First fields of a CDR message.
 struct Prefix<'a> {
     body: &'a [u8],
     at: usize,
@@ -127,7 +127,7 @@ impl<'a> Prefix<'a> {
         }
     }
 
-    /// The `frame_id` of a header, behind its stamp.
+    /// Reads the `frame_id` of a header, after its stamp.
     fn header(&mut self) -> Option<String> {
         self.at = 8;
         self.text()

@@ -19,16 +19,16 @@ pub struct Info {
     json: bool,
 }
 
-/// Contents of a log.
+/// Summary of a log.
 #[derive(Serialize)]
 struct Summary {
     storage: &'static str,
-    /// Of the recorder; null where the log names none.
+    /// ROS distribution of the recorder; null if not recorded.
     ros_distro: Option<String>,
     files: usize,
     bytes: u64,
     messages: u64,
-    /// By `metadata.yaml`; null where it counts as the storage files do.
+    /// Count by `metadata.yaml`; null if it agrees with the storage files.
     metadata_messages: Option<u64>,
     start_ns: Option<i64>,
     end_ns: Option<i64>,
@@ -44,14 +44,14 @@ struct Topic {
     #[serde(rename = "type")]
     type_name: String,
     messages: u64,
-    /// Mean over the log; null for fewer than two messages.
+    /// Mean rate over the log; null for fewer than two messages.
     hz: Option<f64>,
-    /// Of the messages; null where the storage does not tell.
+    /// Message bytes; null if the storage does not provide them.
     bytes: Option<u64>,
-    /// Of the first message.
+    /// Frame of the first message.
     frame_id: Option<String>,
     child_frame_id: Option<String>,
-    /// Parent and child of each transform of the first messages.
+    /// Parent and child of each transform in the first messages.
     transforms: Vec<[String; 2]>,
     type_hash: String,
     is_latched: bool,
@@ -181,7 +181,7 @@ impl Topic {
     }
 }
 
-/// Prints rows with their columns aligned: the third and the fourth to the right.
+/// Prints rows with aligned columns: the third and the fourth right-aligned.
 fn print_table(rows: &[Vec<String>]) {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns)
@@ -207,7 +207,7 @@ fn megabytes(bytes: u64) -> String {
     }
 }
 
-/// A text of a log without characters that move the cursor.
+/// Text of a log without control characters.
 fn plain(text: &str) -> String {
     match text.chars().any(char::is_control) {
         true => text.escape_debug().to_string(),

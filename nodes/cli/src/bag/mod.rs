@@ -1,4 +1,4 @@
-//! `lattice bag`: what is in logs, and damaged ones.
+//! `lattice bag`: inspection and recovery of logs.
 
 mod frames;
 mod info;
@@ -10,12 +10,12 @@ use lattice_bag::{Recovered, Unchecked, recover};
 
 use crate::{CliResult, init_logging};
 
-/// Look after rosbag2 logs
+/// Inspect and recover rosbag2 logs
 #[derive(Subcommand)]
 pub enum Bag {
-    /// Show topics, rates, frames, times and size of a log, also of one whose recorder was killed
+    /// Show topics, rates, frames, times and size of a log, even if its recorder was killed
     Info(info::Info),
-    /// Write what can be read of a damaged log as a sound one, and say what is lost
+    /// Copy the readable part of a damaged log to a new log, and report the losses
     Recover(Recover),
 }
 
@@ -24,10 +24,10 @@ pub enum Bag {
 pub struct Recover {
     /// rosbag2 directory, or an .mcap or .db3 file of one
     bag: PathBuf,
-    /// Directory of the new log, which must not be there yet
+    /// Directory of the new log, which must not exist
     #[arg(long, short)]
     out: PathBuf,
-    /// Print what became of it as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
@@ -79,7 +79,7 @@ fn print(recovered: &Recovered) {
     }
     if recovered.refused > 0 {
         let refused = recovered.refused;
-        println!("{refused} left out that are no messages or of no known topic");
+        println!("{refused} skipped: invalid messages, or of an unknown topic");
     }
     for damage in &recovered.told {
         println!("damage: {damage}");

@@ -1,4 +1,4 @@
-//! Answer of `lattice calibrate`, as text and JSON.
+//! Result of `lattice calibrate`, as text and JSON.
 
 use std::fmt;
 
@@ -10,42 +10,42 @@ use serde::Serialize;
 
 use std::collections::BTreeMap;
 
-/// An answer for people and programs.
+/// Result for people and programs.
 #[derive(Default, Serialize)]
 pub struct Answer {
-    /// None for a single registration, which judges nothing.
+    /// `None` for a single registration, which has no verdict.
     verdict: Option<&'static str>,
     reason: String,
     method: String,
     converged: Option<bool>,
     map_from_cloud: Pose,
-    /// Middle of a cloud that is far from its origin, and its place in the map (m): covariance and sigmas are of that
-    /// point. None of a cloud near its origin, of which they are.
+    /// Centroid of a cloud far from its origin, and its position in the map (m): covariance and sigmas refer to that
+    /// point. `None` for a cloud near its origin, to which they refer.
     cloud_middle_m: Option<[f64; 3]>,
     middle_in_map_m: Option<[f64; 3]>,
-    /// Row-major over x, y, z (m) and turns about x, y, z (rad), map frame; None without a verdict.
+    /// Row-major over x, y, z (m) and rotations about x, y, z (rad), map frame; `None` without a verdict.
     covariance: Option<Vec<f64>>,
     sigma_m: Option<[f64; 3]>,
     sigma_deg: Option<[f64; 3]>,
-    /// None without a verdict.
+    /// `None` without a verdict.
     profile: Option<&'static str>,
-    /// Length in the map over that in the cloud, and its standard deviation; None if the points do not
-    /// tell it.
+    /// Ratio of lengths in the map and in the cloud, with its standard deviation; `None` if the points do not
+    /// determine it.
     scale: Option<f64>,
     scale_sigma: Option<f64>,
-    /// None if no other pose was found.
+    /// `None` if no alternative was found.
     log_margin: Option<f64>,
-    /// Probability that another pose is right; None without a verdict.
+    /// Probability of error; `None` without a verdict.
     p_wrong: Option<f64>,
     inlier_fraction: f64,
     rmse_m: f64,
-    /// Squared shift of parts of the cloud over what sensor and cells explain; None without a verdict.
+    /// Squared shift of parts of the cloud, relative to the expected one; `None` without a verdict.
     chi_square: Option<f64>,
-    /// Share of the points that float before a surface of the map.
+    /// Fraction of points that float before a surface of the map.
     floating_fraction: Option<f64>,
-    /// Share of the lines of sight that go through a surface of the map.
+    /// Fraction of lines of sight through a surface of the map.
     blocked_fraction: Option<f64>,
-    /// Parts of the cloud that the map does not explain, those with the most points first.
+    /// Unexplained parts of the cloud, in descending order of points.
     unexplained: Vec<Part>,
     weak_directions: Vec<Weak>,
     classes: Vec<Class>,
@@ -65,7 +65,7 @@ struct Pose {
 struct Weak {
     kind: &'static str,
     axis: [f64; 3],
-    /// Metres or radians.
+    /// Standard deviation, metres or radians.
     sigma: f64,
 }
 
@@ -73,10 +73,10 @@ struct Weak {
 struct Part {
     /// missing, floating, beside or hidden.
     kind: &'static str,
-    /// Its midst in the map, metres.
+    /// Its centroid, metres.
     place_m: [f64; 3],
     points: usize,
-    /// Distance from the map's surfaces, metres.
+    /// Distance from the surfaces of the map, metres.
     beside_m: f64,
 }
 
@@ -84,22 +84,22 @@ struct Part {
 struct Class {
     class: u16,
     name: Option<String>,
-    /// Share of its observations where the map says the same class.
+    /// Fraction of its observations with the same class in the map.
     agreement: f64,
     observations: f64,
 }
 
-/// Wall times, milliseconds.
+/// Wall clock times, milliseconds.
 #[derive(Clone, Copy, Default, Serialize)]
 pub struct Times {
     pub read_ms: f64,
-    /// To make the map ready, which is done once for all calibrations.
+    /// Preparation of the map, done once for all calibrations.
     pub map_ms: f64,
     pub calibrate_ms: f64,
 }
 
 impl Answer {
-    /// Of a calibration.
+    /// Result of a calibration.
     pub fn of_calibration(
         calibration: &Calibration,
         profile: Profile,
@@ -133,7 +133,7 @@ impl Answer {
             reason: calibration.reason.clone(),
             method: calibration.method.to_owned(),
             map_from_cloud: Pose::of(&calibration.target_from_source),
-            // Symmetric, so that the order of columns is that of rows.
+            // The matrix is symmetric, so column and row order agree.
             covariance: Some(covariance.iter().copied().collect()),
             sigma_m: Some([0, 1, 2].map(sigma)),
             sigma_deg: Some([3, 4, 5].map(|i| sigma(i).to_degrees())),
@@ -154,7 +154,7 @@ impl Answer {
         }
     }
 
-    /// Of a single registration of a cloud with so many points.
+    /// Result of a single registration of a cloud with `points` points.
     pub fn of_registration(method: &str, (registration, points): &(Registration, usize)) -> Answer {
         let state = match registration.converged {
             true => "converged",
@@ -171,8 +171,8 @@ impl Answer {
         }
     }
 
-    /// Turns the pose of a cloud about its middle into that of the cloud; `scaled` if it is that of the cloud times its
-    /// scale.
+    /// Converts the pose of a cloud about its centroid to that of its frame; `scaled` for the pose of the scaled
+    /// cloud.
     pub fn place_origin(&mut self, middle_m: &Vector3<f64>, scaled: bool) {
         if *middle_m == Vector3::zeros() {
             return;
@@ -186,7 +186,7 @@ impl Answer {
         self.middle_in_map_m = Some(middle_in_map.into());
     }
 
-    /// The reason not to use the pose, if there is one.
+    /// Reason not to use the pose, if any.
     pub fn refusal(&self) -> Option<String> {
         match (self.verdict, self.converged) {
             (Some("OK"), _) | (None, Some(true)) => None,
@@ -220,7 +220,7 @@ impl fmt::Display for Answer {
         writeln!(f, "translation    {x:.4} {y:.4} {z:.4} m")?;
         let [qx, qy, qz, qw] = self.map_from_cloud.rotation_xyzw;
         let yaw_deg = self.map_from_cloud.yaw_deg;
-        // A millionth turns a place in UTM by metres.
+        // An error of a millionth rotates a position in UTM by metres.
         let digits = if self.cloud_middle_m.is_some() { 12 } else { 6 };
         writeln!(
             f,

@@ -1,4 +1,4 @@
-//! Inputs of `lattice calibrate`: clouds, guesses, learned confusions.
+//! Inputs of `lattice calibrate`: clouds, guesses, learned label confusions.
 
 use std::fs;
 use std::io::{ErrorKind, Write};
@@ -13,22 +13,22 @@ use crate::CliResult;
 use lattice_nodes::files::points::PointFileOptions;
 use lattice_nodes::files::semantic::read_semantic;
 
-/// Least side of the cells of a map that is a point file, metres.
+/// Smallest default cell size of a point file map, metres.
 const MIN_CELL_M: f64 = 0.05;
-/// Sides of cells on the diagonal of a map that is a point file.
+/// Default number of cells along the diagonal of a point file map.
 const CELLS_A_DIAGONAL: f64 = 400.0;
-/// Cells along an axis that thinning tells apart wherever the cloud is.
+/// Limit of cells per axis for thinning, at any position of the cloud.
 const MOST_CELLS: f64 = 5e5;
-/// Distance of the middle of clouds from their origin from which on they are registered about their middle, m.
+/// Centroid distance from which clouds are registered about their centroid, m.
 const FAR_M: f64 = 1000.0;
-/// Longest file of a learned confusion, bytes.
+/// Largest confusion file, bytes.
 const MAX_CONFUSION_BYTES: u64 = 1 << 20;
 
-/// `map_from_headset` as it is typed.
+/// Typed `map_from_headset`.
 #[derive(Clone, Debug)]
 pub struct Guess(pub Isometry3<f64>);
 
-/// A position as it is typed, metres.
+/// Typed position, metres.
 #[derive(Clone, Debug)]
 pub struct Place(pub Point3<f64>);
 
@@ -82,7 +82,7 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
     words.map(number).collect()
 }
 
-/// The map and the side of its cells; point files are thinned to cells.
+/// Map and its cell size; point files are thinned to cells.
 pub fn map(
     path: &Path,
     cell_side_m: Option<f64>,
@@ -99,15 +99,15 @@ pub fn map(
         let here = path.display();
         let longest_m = size_m.max();
         return Err(format!(
-            "cells of {side_m} m are too small for {here}, which is {longest_m:.1} m long: take {least_m:.1e} m or more \
-             (`--cell`), or leave out what lies far away"
+            "cells of {side_m} m are too small for {here}, which is {longest_m:.1} m long: use {least_m:.1e} m or more \
+             (`--cell`), or remove distant points"
         )
         .into());
     }
     Ok((voxel_downsample(&file.cloud, side_m), side_m))
 }
 
-/// Lengths of the box around a cloud.
+/// Size of the bounding box of a cloud.
 fn size_m(cloud: &SemanticCloud) -> Vector3<f64> {
     let mut low = Point3::from([f64::INFINITY; 3]);
     let mut high = Point3::from([f64::NEG_INFINITY; 3]);
@@ -118,15 +118,15 @@ fn size_m(cloud: &SemanticCloud) -> Vector3<f64> {
     high - low
 }
 
-/// Clouds about a point of their own frame.
+/// Clouds relative to a point of their frame.
 pub struct Scans {
-    /// Their points and sensors, from that point.
+    /// Points and sensors, relative to that point.
     pub scans: Vec<SourceCloud>,
-    /// The point: their origin, or in whole metres their middle if that is far away, as in UTM.
+    /// The point: the origin, or for distant clouds such as in UTM their centroid in whole metres.
     pub middle_m: Vector3<f64>,
 }
 
-/// The clouds, in the axes of ROS.
+/// Clouds in the axes of ROS.
 pub fn headset_scans(
     paths: &[PathBuf],
     axes: Axes,
@@ -167,31 +167,31 @@ impl Scans {
         Self { scans, middle_m }
     }
 
-    /// A pose of the clouds as one of the point that they are about.
+    /// Pose of the clouds converted to a pose of their reference point.
     pub fn pose_of_middle(&self, map_from_cloud: &Isometry3<f64>) -> Isometry3<f64> {
         map_from_cloud * Translation3::from(self.middle_m)
     }
 }
 
-/// The confusion that earlier calibrations learned, if there is a file.
+/// Label confusion learned by earlier calibrations, if the file exists.
 pub fn confusion(path: &Path) -> CliResult<Option<Confusion>> {
     let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
     let bytes = match fs::metadata(path) {
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
         Err(e) => return Err(here(&e).into()),
         Ok(about) if about.len() > MAX_CONFUSION_BYTES => {
-            return Err(here(&"too long for what calibrations learn").into());
+            return Err(here(&"too large for a learned confusion").into());
         }
         Ok(_) => fs::read(path).map_err(|e| here(&e))?,
     };
     let known: Confusion = serde_json::from_slice(&bytes).map_err(|e| here(&e))?;
     match known.is_valid() {
         true => Ok(Some(known)),
-        false => Err(here(&"not what a calibration learned").into()),
+        false => Err(here(&"not a learned confusion").into()),
     }
 }
 
-/// Writes the learned confusion; readers see the whole file or the one before.
+/// Writes the learned confusion atomically.
 pub fn keep_confusion(path: &Path, confusion: &Confusion) -> CliResult {
     let folder = path
         .parent()

@@ -11,29 +11,29 @@ use std::time::Instant;
 use super::answer::Times;
 use super::milliseconds;
 
-/// Gate of the methods for which none is published, metres.
+/// Default gate of methods without a published one, metres.
 const GATE_M: f64 = 1.0;
 
-/// A way to calibrate: by search and judgement, or by a single registration.
+/// Calibration method: search with a verdict, or a single registration.
 #[derive(Clone, Copy, Debug)]
 pub struct MethodName(Option<&'static NamedMethod>);
 
 impl MethodName {
-    /// The values of `--method` with their help.
+    /// Values of `--method` with their help.
     pub fn parser() -> impl TypedValueParser<Value = MethodName> {
-        let auto = PossibleValue::new("auto").help("Search, several registrations, one judge");
+        let auto = PossibleValue::new("auto").help("Search, several registrations, and a verdict");
         let single = |method: &NamedMethod| PossibleValue::new(method.option).help(method.help);
         let values = std::iter::once(auto).chain(NamedMethod::ALL.iter().map(single));
         PossibleValuesParser::new(values)
             .map(|option: String| MethodName(NamedMethod::ALL.iter().find(|m| m.option == option)))
     }
 
-    /// The value of `--method`.
+    /// Value of `--method`.
     pub fn name(self) -> &'static str {
         self.0.map_or("auto", |method| method.option)
     }
 
-    /// The registration, if it is a single one, with a gate in place of its own if given.
+    /// Single registration of the method, if any, with the given gate.
     pub fn single(self, gate_m: Option<f64>) -> Option<RegisterOptions<'static>> {
         let mut options = self.0?.options(GATE_M);
         options.gate_m = gate_m.unwrap_or(options.gate_m);
@@ -41,7 +41,7 @@ impl MethodName {
     }
 }
 
-/// Registers the cloud, thinned to the cells of the map; also the number of points left of it.
+/// Registers the cloud, thinned to the cells of the map; returns also the number of remaining points.
 pub fn register_once(
     method: &RegisterOptions,
     (map, cell_side_m): (SemanticCloud, f64),
@@ -61,7 +61,7 @@ pub fn register_once(
     Ok((registration, cloud.len()))
 }
 
-/// All headset scans as one cloud; points of headset scans without labels are unlabelled.
+/// All scans as one cloud; points of scans without labels are unlabelled.
 fn together(headset_scans: &[SourceCloud]) -> SemanticCloud {
     let labelled = headset_scans.iter().any(|s| !s.cloud.labels.is_empty());
     let mut all = SemanticCloud::default();

@@ -30,22 +30,22 @@ use options::SearchOptions;
 /// Options of `lattice calibrate`.
 ///
 /// Finds the pose of a cloud's frame in a map, without a guess if none is given, and judges whether
-/// the answer can be trusted. The exit status is 0 only with the verdict OK, or with a method other
-/// than `auto` if it converged; the answer is printed in any case.
+/// the result is reliable. The exit status is 0 only with the verdict OK, or with a method other
+/// than `auto` if it converged; the result is printed in any case.
 #[derive(Args)]
 pub struct Calibrate {
     /// Map file, or ply, pcd, xyz (also .bz2) with or without a number `label` of each point, las, laz, e57, bt
     /// (octomap), or KITTI bin with a .label file of SemanticKITTI beside it or in ../labels; metres, z up
     #[arg(long, value_name = "FILE")]
     map: PathBuf,
-    /// Cloud to find in it, of the same kinds; gravity along -z once the axes are those of ROS. Several
-    /// of one frame are taken together
+    /// Cloud to find in it, of the same formats; gravity along -z once the axes are those of ROS. Several clouds
+    /// of one frame are used together
     #[arg(long, value_name = "FILE", required = true)]
     cloud: Vec<PathBuf>,
     /// YAML with the names of the classes, `classes:` followed by lines `number: name`
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,
-    /// The cloud's frame in the map as far as it is known: "x y z yaw_deg" or "x y z qx qy qz qw"
+    /// Approximate pose of the cloud's frame in the map: "x y z yaw_deg" or "x y z qx qy qz qw"
     #[arg(long, allow_hyphen_values = true)]
     guess: Option<Guess>,
     /// Position of the cloud's sensor, in its axes: "x y z" (m)
@@ -54,21 +54,21 @@ pub struct Calibrate {
     /// Axes of the cloud: ros_flu, unity_ruf (left-handed), winrt_rub or optical
     #[arg(long, default_value = "ros_flu")]
     axes: Axes,
-    /// auto searches and judges; the others are single registrations from the guess
+    /// auto searches and gives a verdict; the others are single registrations from the guess
     #[arg(long, value_parser = MethodName::parser(), default_value = "auto")]
     method: MethodName,
-    /// Longest distance of a pair of points for the single registrations, m [default: as published]
+    /// Correspondence distance limit of single registrations, m [default: as published]
     #[arg(long)]
     gate: Option<f64>,
-    /// Confusion of labels learned by earlier calibrations: read if it is there, written back
+    /// Label confusion learned by earlier calibrations: read if the file exists, written
     /// after a calibration that is OK
     #[arg(long, value_name = "FILE")]
     confusion: Option<PathBuf>,
-    /// Side of the cells that points are thinned to, m [default: that of the map file or octree; of a
+    /// Cell size for thinning points, m [default: that of the map file or octree; of a
     /// point file 1/400 of the diagonal, at least 0.05]
     #[arg(long)]
     cell: Option<f64>,
-    /// Most points to read of a file
+    /// Limit of points per file
     #[arg(long, default_value_t = 20_000_000)]
     max_points: usize,
     #[command(flatten)]
@@ -86,7 +86,7 @@ impl Calibrate {
         init_logging();
         self.check()?;
         let most = self.max_points.saturating_mul(self.cloud.len());
-        // What is out of bounds is told before anything is read.
+        // Options are checked before anything is read.
         self.search.options(self.axes, most, &[])?;
         let names = match &self.labels {
             Some(path) => read_classes(path).map_err(|e| format!("{}: {e}", path.display()))?,
@@ -140,16 +140,14 @@ impl Calibrate {
 
     fn check(&self) -> Result<(), String> {
         let positive = |name: &str, value: Option<f64>| match value {
-            Some(v) if !(v.is_finite() && v > 0.0) => {
-                Err(format!("--{name} {v} is no length over 0"))
-            }
+            Some(v) if !(v.is_finite() && v > 0.0) => Err(format!("--{name} {v} is not above 0")),
             _ => Ok(()),
         };
         positive("gate", self.gate)?;
         positive("cell", self.cell)
     }
 
-    /// Searches, judges and keeps the learned confusion.
+    /// Searches, judges and stores the learned confusion.
     fn find(
         &self,
         (map, cell_side_m): (SemanticCloud, f64),
@@ -188,7 +186,7 @@ fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
-/// Shows the progress of a calibration.
+/// Progress display of a calibration.
 struct Shown<'a>(&'a Progress);
 
 impl lattice_core::registration::Progress for Shown<'_> {

@@ -1,71 +1,71 @@
-//! Options of the search of `lattice calibrate`: the profile and what is set in its place.
+//! Search options of `lattice calibrate`: the profile and its overrides.
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lattice_core::pose::Axes;
 use lattice_core::registration::{CalibrationOptions, Profile, SourceCloud};
 
-/// Sensor and thresholds; each that is left out is that of the profile.
+/// Sensor and thresholds, by default of the profile.
 #[derive(Args)]
 #[command(next_help_heading = "Search and verdict [default: of the profile]")]
 pub struct SearchOptions {
-    /// Sensor of the cloud, which sets the others
+    /// Sensor of the cloud, which sets the defaults of the others
     #[arg(long, alias = "from", value_parser = profile(), default_value = AUTO)]
     profile: Sensor,
     /// Standard deviation of the cloud's points, m
     #[arg(long)]
     noise: Option<f64>,
-    /// Side of the regions of the cloud that err together, m
+    /// Size of regions of the cloud with correlated errors, m
     #[arg(long)]
     region: Option<f64>,
     /// Standard deviation of the cloud's scale
     #[arg(long)]
     scale_sigma: Option<f64>,
-    /// Standard deviation of the tilt between cloud and map, rad; 0: one of them may lean
+    /// Standard deviation of the tilt between cloud and map, rad; 0: the gravity direction of one of them is unknown
     #[arg(long)]
     gravity_sigma: Option<f64>,
-    /// Share of places where equal class numbers are expected to agree before anything was learned
+    /// Prior fraction of places where equal class numbers agree
     #[arg(long)]
     agreement: Option<f64>,
-    /// Farthest that the answer may be from a guess, m
+    /// Largest distance of the result from a guess, m
     #[arg(long)]
     guess_radius: Option<f64>,
-    /// Most that the heading of the answer may differ from that of a guess, rad
+    /// Largest heading difference of the result from a guess, rad
     #[arg(long)]
     guess_yaw: Option<f64>,
-    /// Fewest points of a cloud
+    /// Smallest number of points of a cloud
     #[arg(long)]
     min_points: Option<usize>,
-    /// About how many points are registered; more are thinned
+    /// Approximate number of registered points; larger clouds are thinned
     #[arg(long)]
     registered_points: Option<usize>,
-    /// Largest probability that another pose is right, for a pose to be OK
+    /// Largest probability of error for the verdict OK
     #[arg(long)]
     max_p_wrong: Option<f64>,
-    /// Share of the points that must lie on the map for it
+    /// Smallest inlier fraction for OK
     #[arg(long)]
     min_inliers: Option<f64>,
-    /// Share of the lines of sight that may end before a surface of the map, with nothing of it there, or go through one
+    /// Largest fraction of contradicted lines of sight for OK: those that end before a surface of the map, or pass through one
     #[arg(long)]
     max_contradicted: Option<f64>,
-    /// Most standard deviation of the place in its least sure direction for it, m
+    /// Largest standard deviation of the position in its weakest direction for OK, m
     #[arg(long)]
     max_sigma: Option<f64>,
-    /// Most standard deviation of a rotation about any axis for it, rad
+    /// Largest standard deviation of a rotation about any axis for OK, rad
     #[arg(long)]
     max_sigma_rad: Option<f64>,
-    /// Share by which the cloud's scale may differ from 1 for it
+    /// Largest deviation of the cloud's scale from 1 for OK
     #[arg(long)]
     max_scale_error: Option<f64>,
-    /// Scale the cloud to the map, whatever its scale; the pose is that of the scaled cloud
+    /// Scale the cloud to the map, for any scale; the pose is that of the scaled cloud
     #[arg(long)]
     estimate_scale: bool,
-    /// Try no other axes, mirrorings and scales of the cloud: these are certain; takes a fifth less time or more
+    /// Test no other axis conventions and scales of the cloud: these are certain; saves a fifth of the time or more
     #[arg(long)]
     trust_axes: bool,
 }
 
-/// Profile that is asked for; None for that of the sensor that the cloud looks like.
+/// Requested profile; `None`: detected from the cloud.
 #[derive(Clone, Copy)]
 struct Sensor(Option<Profile>);
 
@@ -77,7 +77,7 @@ fn profile() -> impl TypedValueParser<Value = Sensor> {
         Profile::Lidar => "A laser scanner that may lean",
         Profile::DepthCamera => "A depth camera with an IMU",
     };
-    let auto = PossibleValue::new(AUTO).help("As its range, density and noise tell");
+    let auto = PossibleValue::new(AUTO).help("Detected from range, density and noise");
     let value = |profile: Profile| PossibleValue::new(profile.name()).help(help(profile));
     let values = std::iter::once(auto).chain(Profile::ALL.map(value));
     let named = |name: &str| Profile::ALL.into_iter().find(|p| p.name() == name);
@@ -85,7 +85,7 @@ fn profile() -> impl TypedValueParser<Value = Sensor> {
         .map(move |name: String| Sensor(named(&name)))
 }
 
-/// A number in its bounds, or the default if none is given.
+/// Checks that a number is within its bounds; the default if none is given.
 fn within(
     name: &str,
     value: Option<f64>,
@@ -94,22 +94,22 @@ fn within(
 ) -> Result<f64, String> {
     match value {
         Some(value) if !(least..=most).contains(&value) => {
-            Err(format!("--{name} {value} is not from {least} to {most}"))
+            Err(format!("--{name} {value} is outside {least} to {most}"))
         }
         _ => Ok(value.unwrap_or(default)),
     }
 }
 
 impl SearchOptions {
-    /// True if the pose is that of the cloud scaled to the map.
+    /// True if the pose is that of the scaled cloud.
     pub fn scales(&self) -> bool {
         self.estimate_scale
     }
 
-    /// The options of a calibration of clouds that were read as `axes`.
+    /// Options of a calibration of clouds read with the axes `axes`.
     ///
     /// # Errors
-    /// Names a number that is out of bounds.
+    /// If a number is out of bounds.
     pub fn options(
         &self,
         axes: Axes,

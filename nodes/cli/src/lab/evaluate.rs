@@ -14,7 +14,7 @@ use lattice_lab::evaluate::{
 };
 use lattice_lab::simulate::house::Scene;
 use lattice_lab::{markdown, write_report};
-use lattice_nodes::files::whole::write_text;
+use lattice_nodes::files::atomic_write::write_text;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 

@@ -8,7 +8,7 @@ use lattice_lab::evaluate::kitti::{
     read_scans, write_scans,
 };
 use lattice_lab::{markdown, write_report};
-use lattice_nodes::files::whole::write_text;
+use lattice_nodes::files::atomic_write::write_text;
 use std::path::PathBuf;
 
 /// Options of `lattice evaluate kitti`.

@@ -19,7 +19,7 @@ use clap::Subcommand;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lattice_core::voxels::VoxelList;
 use lattice_lab::render::{RenderOptions, render_png};
-use lattice_nodes::files::whole;
+use lattice_nodes::files::atomic_write;
 use serde::Serialize;
 use std::fmt::Display;
 use std::path::Path;
@@ -58,7 +58,7 @@ impl Lab {
 
 /// Draws a map as a PNG file.
 pub fn picture(list: &VoxelList, options: &RenderOptions, out: &Path) -> CliResult {
-    whole::write(out, |file| render_png(list, options, file))
+    atomic_write::write(out, |file| render_png(list, options, file))
 }
 
 /// A value of an option with its name and help.

@@ -16,7 +16,7 @@ use crate::progress::Progress;
 /// Options of `lattice map merge`.
 #[derive(Args)]
 pub struct Merge {
-    /// Map files; the first gives the datum
+    /// Map files; the first one defines the datum
     #[arg(required = true)]
     maps: Vec<PathBuf>,
     /// Map file to write
@@ -24,7 +24,7 @@ pub struct Merge {
     out: PathBuf,
     #[command(flatten)]
     form: Form,
-    /// Print what was written as JSON
+    /// Print the written size as JSON
     #[arg(long)]
     json: bool,
 }
@@ -34,7 +34,7 @@ pub struct Merge {
 pub struct Diff {
     /// Map file
     a: PathBuf,
-    /// Map file of the same cells
+    /// Map file with the same cells
     b: PathBuf,
     /// Write the voxels of the first map that are not in the second
     #[arg(long, short)]
@@ -51,10 +51,10 @@ pub struct Diff {
 pub struct Crop {
     /// Map file
     map: PathBuf,
-    /// Least coordinates of a centre, map frame, in m
+    /// Smallest coordinates of a centre, map frame, in m
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, required = true)]
     min: Vec<f64>,
-    /// A centre with one of these coordinates is outside, so that boxes side by side share none
+    /// Largest coordinates, exclusive, so that adjacent boxes are disjoint
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, required = true)]
     max: Vec<f64>,
     /// Map file to write
@@ -62,7 +62,7 @@ pub struct Crop {
     out: PathBuf,
     #[command(flatten)]
     form: Form,
-    /// Print what was written as JSON
+    /// Print the written size as JSON
     #[arg(long)]
     json: bool,
 }
@@ -82,7 +82,7 @@ impl Merge {
                 if *known != name {
                     let path = path.display();
                     return Err(format!(
-                        "{path}: label {label} is {name:?}, but {known:?} in a map before: only maps with the same classes are merged"
+                        "{path}: label {label} is {name:?}, but {known:?} in an earlier map: only maps with the same classes can be merged"
                     )
                     .into());
                 }
@@ -155,7 +155,7 @@ impl Crop {
     /// Runs the command.
     pub fn run(self) -> CliResult {
         let sides: Vec<(f64, f64)> = self.min.iter().copied().zip(self.max.clone()).collect();
-        // Not a number is refused too.
+        // Rejects NaN too.
         if !sides.iter().all(|(min, max)| min < max) {
             return Err(format!(
                 "--min {:?} is not below --max {:?} on every axis",

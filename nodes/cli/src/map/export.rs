@@ -9,21 +9,21 @@ use super::read;
 use crate::CliResult;
 #[cfg(feature = "lab")]
 use lattice_lab::render::RenderOptions;
+use lattice_nodes::files::atomic_write;
 use lattice_nodes::files::export::{
     write_centers_pcd, write_centers_ply, write_centers_xyz, write_mesh_ply, write_octree,
 };
-use lattice_nodes::files::whole;
 
 /// Options of `lattice map export`.
 #[derive(Args)]
 pub struct Export {
-    /// Map file, as `--map-out` writes it
+    /// Map file, as written by `--map-out`
     map: PathBuf,
-    /// File to write: .ply, .pcd or .xyz (centres), .bt (octree of octomap, of half the cell size) or .png (a picture);
-    /// without extension PLY
+    /// File to write: .ply, .pcd or .xyz (centres), .bt (octree of octomap, of half the cell size) or .png (an image);
+    /// PLY without extension
     #[arg(long, short)]
     out: PathBuf,
-    /// Form to write; a `.png` file is always a picture
+    /// Form to write; a `.png` file is always an image
     #[arg(long = "as", value_enum, default_value = "centers")]
     form: Form,
     #[cfg(feature = "lab")]
@@ -31,20 +31,20 @@ pub struct Export {
     picture: Picture,
 }
 
-/// Camera of the picture.
+/// Camera of the image.
 #[cfg(feature = "lab")]
 #[derive(Args)]
 struct Picture {
-    /// Size of the picture
+    /// Width of the image, pixels
     #[arg(long, default_value_t = 1200)]
     width: u32,
-    /// Size of the picture
+    /// Height of the image, pixels
     #[arg(long, default_value_t = 800)]
     height: u32,
-    /// Direction from which the picture is taken, clockwise from north
+    /// Viewing direction of the camera, clockwise from north, in degrees
     #[arg(long, default_value_t = 215.0)]
     azimuth: f64,
-    /// Height of the camera over the horizon, in degrees
+    /// Elevation of the camera above the horizon, in degrees
     #[arg(long, default_value_t = 35.0)]
     elevation: f64,
 }
@@ -55,12 +55,12 @@ enum Form {
     Centers,
     /// PLY mesh: exposed faces of the cells
     Mesh,
-    /// PNG picture
+    /// PNG image
     #[cfg(feature = "lab")]
     Png,
 }
 
-/// Kind of the file.
+/// Output format.
 #[derive(Clone, Copy)]
 enum Target {
     CentersPly,
@@ -80,12 +80,12 @@ impl Export {
         let list = map.into_list(usize::MAX);
         let out = &self.out;
         match target {
-            Target::CentersPly => whole::write(out, |out| write_centers_ply(&list, out)),
-            Target::CentersPcd => whole::write(out, |out| write_centers_pcd(&list, out)),
-            Target::CentersXyz => whole::write(out, |out| write_centers_xyz(&list, out)),
-            Target::MeshPly => whole::write(out, |out| write_mesh_ply(&list, out)),
+            Target::CentersPly => atomic_write::write(out, |out| write_centers_ply(&list, out)),
+            Target::CentersPcd => atomic_write::write(out, |out| write_centers_pcd(&list, out)),
+            Target::CentersXyz => atomic_write::write(out, |out| write_centers_xyz(&list, out)),
+            Target::MeshPly => atomic_write::write(out, |out| write_mesh_ply(&list, out)),
             Target::Octree => {
-                let tree = whole::write(out, |out| write_octree(&list, out))?;
+                let tree = atomic_write::write(out, |out| write_octree(&list, out))?;
                 let exact = match list.lattice().kind() {
                     LatticeKind::Cubic => "each cell is eight voxels, exactly",
                     _ => "those with their centre in an occupied cell (--lattice cubic is exact)",
@@ -99,7 +99,7 @@ impl Export {
         }
     }
 
-    /// Kind of the file by its extension and the form; refuses one that the other is not.
+    /// Output format by extension and form; an error if they contradict each other.
     fn target(&self) -> Result<Target, String> {
         let extension = self.out.extension().unwrap_or_default().to_string_lossy();
         let known = match (extension.to_ascii_lowercase().as_str(), self.form) {

@@ -11,7 +11,7 @@ use crate::CliResult;
 /// Options of `lattice map info`.
 #[derive(Args)]
 pub struct Info {
-    /// Map file, as `--map-out` writes it
+    /// Map file, as written by `--map-out`
     map: PathBuf,
     /// Print as JSON
     #[arg(long)]
@@ -22,7 +22,7 @@ pub struct Info {
 struct Summary {
     lattice: &'static str,
     cell_volume_m3: f64,
-    /// Edge of the cube of the same volume.
+    /// Edge of the cube of equal volume.
     cell_size_m: f64,
     datum_m: [f64; 3],
     datum_index: [i64; 3],

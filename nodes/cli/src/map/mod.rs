@@ -16,24 +16,24 @@ use lattice_core::voxels::label_names::{LabelNames, read_label_names};
 
 use super::{CliResult, fleet, init_logging};
 
-/// Look into map files, export, merge, compare, cut and question them
+/// Inspect, export, merge, compare, crop and query map files
 #[derive(Subcommand)]
 pub enum Map {
-    /// Lattice, size, extent and statistics
+    /// Show lattice, size, extent and statistics
     Info(info::Info),
-    /// As PLY or PCD (cell centres), PLY mesh of exposed cell faces, octree of octomap (.bt), or as a picture
+    /// Export as PLY or PCD (cell centres), PLY mesh of exposed cell faces, octree of octomap (.bt), or PNG image
     Export(export::Export),
-    /// One map of the voxels of several with the same cells; of one, to write it in another form
+    /// Merge the voxels of several maps with the same cells; with one map, convert its form
     Merge(combine::Merge),
-    /// Numbers of voxels in one map, in the other, in both; writes those only in the first
+    /// Count voxels in either map and in both; optionally write those only in the first
     Diff(combine::Diff),
-    /// The voxels with their centre in a box
+    /// Write the voxels with their centre in a box
     Crop(combine::Crop),
-    /// The nearest voxels, the clearance of a point, or the shortest path of a ball
+    /// Find the nearest voxels, the clearance of a point, or the shortest path of a ball
     Query(query::Query),
     /// Add map files to a folder of Parquet tables; needs the program lattice-fleet
     ToTable(fleet::Fleet),
-    /// One map file of a folder of Parquet tables; needs the program lattice-fleet
+    /// Write one map file from a folder of Parquet tables; needs the program lattice-fleet
     FromTable(fleet::Fleet),
 }
 
@@ -63,7 +63,7 @@ pub fn read_named(path: &Path) -> CliResult<(MapContents, LabelNames)> {
     Ok((map, names))
 }
 
-/// Reads a map, and the bytes of its file, which bound the voxels.
+/// Reads a map with the size of its file, which bounds the voxels.
 pub fn read(path: &Path) -> CliResult<(MapContents, u64)> {
     let here = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
     let file = File::open(path).map_err(|e| here(&e))?;

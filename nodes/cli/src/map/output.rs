@@ -1,4 +1,4 @@
-//! Map files that commands write.
+//! Map files written by commands.
 
 use std::io::Write;
 use std::path::Path;
@@ -6,26 +6,26 @@ use std::path::Path;
 use clap::Args;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
 use lattice_core::voxels::label_names::{LabelNames, write_named};
-use lattice_nodes::files::whole;
+use lattice_nodes::files::atomic_write;
 use serde::Serialize;
 
 use crate::CliResult;
 
-/// The form of a map file.
+/// Form of a map file.
 #[derive(Args)]
 pub struct Form {
-    /// Pack by zstd, at a level from 1 to 19 (--zstd=LEVEL)
+    /// Compress with zstd, at a level from 1 to 19 (--zstd=LEVEL)
     #[arg(
         long, value_name = "LEVEL", num_args = 0..=1, require_equals = true,
         default_missing_value = "3", value_parser = clap::value_parser!(i32).range(1..=19),
     )]
     zstd: Option<i32>,
-    /// Leave out the counts and mean offsets of the voxels
+    /// Omit the counts and mean offsets of the voxels
     #[arg(long)]
     pub occupancy_only: bool,
 }
 
-/// Size of a map file that was written.
+/// Size of a written map file.
 #[derive(Serialize)]
 pub struct Written {
     voxels: usize,
@@ -35,7 +35,7 @@ pub struct Written {
 }
 
 impl Form {
-    /// Writes a map with the names of its labels; readers see the whole file or the one before.
+    /// Writes a map with the names of its labels, atomically.
     pub fn write(&self, map: &MapContents, names: &LabelNames, out: &Path) -> CliResult<Written> {
         let none = LabelNames::new();
         let kept = map.payload().labels && !self.occupancy_only;
@@ -44,7 +44,7 @@ impl Form {
             zstd_level: self.zstd,
             occupancy_only: self.occupancy_only,
         };
-        let file_bytes = whole::write(out, |writer| {
+        let file_bytes = atomic_write::write(out, |writer| {
             let mut file = Counted { writer, bytes: 0 };
             write_named(map, names, &mut file, &options).map(|()| file.bytes)
         })?;

@@ -20,16 +20,16 @@ use crate::CliResult;
 pub struct Query {
     /// Map file
     map: PathBuf,
-    /// The occupied cells with centres nearest to a point, map frame, in m
+    /// Find the occupied cells with centres nearest to a point, map frame, in m
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, group = "question")]
     nearest: Option<Vec<f64>>,
     /// Number of cells
     #[arg(short, default_value_t = 1, requires = "nearest", value_parser = clap::value_parser!(u32).range(1..))]
     k: u32,
-    /// Distance from a point to the nearest occupied cell as the polyhedron that it is, and 0 in one
+    /// Compute the distance from a point to the nearest occupied polyhedral cell, 0 inside one
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, group = "question")]
     clearance: Option<Vec<f64>>,
-    /// The shortest way of a ball between two points along centres of free cells
+    /// Find the shortest path of a ball between two points along centres of free cells
     #[arg(
         long, num_args = 6, value_names = ["X", "Y", "Z", "X", "Y", "Z"], allow_negative_numbers = true,
         group = "question", requires = "radius",
@@ -38,7 +38,7 @@ pub struct Query {
     /// Radius of the ball, m
     #[arg(long, requires = "path")]
     radius: Option<f64>,
-    /// Give up the search for a path after this many cells
+    /// Limit of expanded cells of a path search
     #[arg(long, default_value_t = 2_000_000, requires = "path")]
     max_cells: usize,
     /// Print as JSON
@@ -65,7 +65,7 @@ struct Way {
 #[serde(rename_all = "lowercase")]
 enum Answer {
     Nearest(Vec<Cell>),
-    /// None if no cell is occupied.
+    /// `None` if no cell is occupied.
     Clearance(Option<Cell>),
     Path(Way),
 }
@@ -75,7 +75,7 @@ impl Query {
     pub fn run(self) -> CliResult {
         let here = |e: &dyn std::fmt::Display| format!("{}: {e}", self.map.display());
         let file = File::open(&self.map).map_err(|e| here(&e))?;
-        // The size of the file bounds the memory.
+        // The file size bounds the memory.
         let store = read_occupancy(BufReader::new(file), usize::MAX).map_err(|e| here(&e))?;
         let answer = self.answer(&Questions::new(&store))?;
         if self.json {
@@ -108,7 +108,7 @@ impl Query {
             Some((first_point(ends)?, goal))
         });
         let (Some((start, goal)), Some(radius_m)) = (ends, self.radius) else {
-            return Err("ask for --nearest, --clearance or --path with --radius".into());
+            return Err("give --nearest, --clearance or --path with --radius".into());
         };
         let options = PathOptions {
             radius_m,
@@ -138,10 +138,7 @@ impl Answer {
             Self::Nearest(cells) => cells.iter().for_each(Cell::print),
             Self::Clearance(Some(cell)) => cell.print(),
             Self::Path(way) => {
-                println!(
-                    "{:.3} m, {} cells looked around from",
-                    way.length_m, way.expanded
-                );
+                println!("{:.3} m, {} cells expanded", way.length_m, way.expanded);
                 for [x, y, z] in &way.centers_m {
                     println!("  {x:.3} {y:.3} {z:.3}");
                 }

@@ -1,4 +1,4 @@
-//! `lattice replay`: maps of a log.
+//! `lattice replay`: maps from a log.
 
 pub mod node_process;
 mod params;
@@ -17,7 +17,7 @@ use super::{CliResult, Lattices, fleet, init_logging};
 use lattice_bag::BagReader;
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::enu_transformer::ins::InsSource;
-use lattice_nodes::files::whole;
+use lattice_nodes::files::atomic_write;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::{self, Pipeline, RunReport, Slice, TopicPlan, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
@@ -25,7 +25,7 @@ use lattice_runtime::LoopbackDomain;
 use processes::DdsReplay;
 pub use processes::{param, quoted, yaml_text};
 
-/// Lattices of a replay over DDS: each takes two of the twelve participants that loopback shows.
+/// Limit of lattices in a replay over DDS: each needs two of the twelve participants on loopback.
 const MAX_LOOPBACK_LATTICES: usize = 5;
 
 /// Map a rosbag2 log
@@ -33,63 +33,63 @@ const MAX_LOOPBACK_LATTICES: usize = 5;
 pub struct Replay {
     /// rosbag2 directory, or one mcap or db3 file of it
     pub bag: PathBuf,
-    /// Feed the nodes' state machines in this process, as fast as it goes, instead of playing
-    /// the log over DDS to one process for each node
+    /// Run the nodes' state machines in this process, as fast as possible, instead of playing
+    /// the log over DDS to one process per node
     #[arg(long)]
     pub direct: bool,
-    /// cubic, bcc, fcc, mcc, hex, hexopt, several with commas, paper, or all; of the parameters if not given
+    /// cubic, bcc, fcc, mcc, hex, hexopt, several separated by commas, paper, or all; by default from the parameters
     #[arg(long)]
     pub lattice: Option<Lattices>,
     #[command(flatten)]
     pub cells: CellSize,
-    /// Orientation of the cells: paper, ground (flattest), or a crystal direction that points up, as
-    /// 110-up; of the parameters if not given (paper)
+    /// Orientation of the cells: paper, ground (flattest), or a crystal direction that points up, such as
+    /// 110-up; by default from the parameters (paper)
     #[arg(long)]
     pub orientation: Option<Orientation>,
-    /// Parameter files of the nodes, later ones win
+    /// Parameter files of the nodes; later ones override earlier ones
     #[arg(long = "params", value_name = "FILE")]
     pub params: Vec<PathBuf>,
     /// One parameter, as in `-p ins.source:=odometry`
     #[arg(short = 'p', long = "param", value_name = "NAME:=VALUE")]
     pub param: Vec<String>,
-    /// Cloud topics; found in the log if not given
+    /// Cloud topics; by default detected in the log
     #[arg(long, value_name = "TOPIC")]
     pub points: Vec<String>,
     /// Source of poses: odometry, inspvax, inspva, navsatfix_imu, pose, pose_with_covariance, or tf (transforms
-    /// alone); found in the log, in this order, if not given
+    /// only); by default detected in the log, in this order
     #[arg(long)]
     pub ins: Option<InsSource>,
-    /// Topic of the INS; found in the log if not given
+    /// Topic of the INS; by default detected in the log
     #[arg(long, value_name = "TOPIC")]
     pub ins_topic: Option<String>,
     /// Threads of the direct replay; 0: all cores
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Speed of the log over DDS, 1 is real time
+    /// Playback rate over DDS, 1 is real time
     #[arg(long, default_value_t = 1.0)]
     pub rate: f64,
-    /// Map only clouds from here on, s of log time from its beginning; needs --direct
+    /// Map only clouds from this time on, s of log time from its beginning; needs --direct
     #[arg(long, value_name = "SECONDS")]
     pub start: Option<f64>,
-    /// Map only clouds before this, s of log time from its beginning; needs --direct
+    /// Map only clouds before this time, s of log time from its beginning; needs --direct
     #[arg(long, value_name = "SECONDS")]
     pub stop: Option<f64>,
-    /// Write the map here, for `lattice map`; with several lattices the name goes before the ending
+    /// File for the map, for `lattice map`; with several lattices their names precede the extension
     #[arg(long, value_name = "FILE")]
     pub map_out: Option<PathBuf>,
-    /// Add the map to a folder of tables, for `lattice fleet`; needs --direct and the program lattice-fleet
+    /// Folder of tables to add the map to, for `lattice fleet`; needs --direct and the program lattice-fleet
     #[arg(long, value_name = "DIR")]
     pub out_table: Option<PathBuf>,
     /// Print the report as JSON
     #[arg(long)]
     pub json: bool,
-    /// Port of a viewer of one of the maps.
+    /// Port of a viewer for one of the maps.
     #[arg(skip)]
     pub viewer: Option<u16>,
 }
 
 impl Replay {
-    /// Maps a log directly, as the parameters' defaults say, and writes the map.
+    /// Replay of a log in this process with default parameters, which writes the map.
     #[cfg(feature = "viewer")]
     pub fn of_log(bag: &std::path::Path, map_out: &std::path::Path) -> Self {
         Self {
@@ -105,7 +105,7 @@ impl Replay {
     pub fn run(self) -> CliResult {
         init_logging();
         let report = self.replay()?;
-        // Warnings were logged when they came up.
+        // Warnings were logged when they occurred.
         for note in report
             .transformer
             .notes
@@ -122,7 +122,7 @@ impl Replay {
         Ok(report.check()?)
     }
 
-    /// Runs the replay and returns its report, in which the map may be empty.
+    /// Runs the replay and returns its report; the map may be empty.
     pub fn replay(&self) -> CliResult<RunReport> {
         self.check_names()?;
         if self.direct {
@@ -144,11 +144,11 @@ impl Replay {
             let count = lattices.len();
             return Err(format!(
                 "{count} lattices over DDS on loopback: at most \
-                 {MAX_LOOPBACK_LATTICES} find each other; use --direct"
+                 {MAX_LOOPBACK_LATTICES} are possible; use --direct"
             )
             .into());
         }
-        // Apart from robots and other replays, whatever ROS_DOMAIN_ID says.
+        // Separate from robots and other replays, regardless of ROS_DOMAIN_ID.
         let domain = LoopbackDomain::take()?;
         processes::run(&DdsReplay {
             options: self,
@@ -193,7 +193,7 @@ impl Replay {
         Ok(report)
     }
 
-    /// Chooses topics and frames, and says which.
+    /// Chooses topics and frames, and logs them.
     fn plan(&self, bag: &BagReader) -> CliResult<TopicPlan> {
         let plan = replay::plan(bag, &self.wishes()?)?;
         for line in &plan.choices {
@@ -202,7 +202,7 @@ impl Replay {
         Ok(plan)
     }
 
-    /// Part of the log whose clouds are mapped.
+    /// Time range of mapped clouds.
     fn slice(&self) -> Slice {
         Slice {
             from_s: self.start.unwrap_or(Slice::WHOLE.from_s),
@@ -210,7 +210,7 @@ impl Replay {
         }
     }
 
-    /// Writes the maps to a file each, which `lattice-fleet` makes parts of the tables.
+    /// Writes each map to a file, which `lattice-fleet` adds to the tables.
     fn add_to_tables(&self, tables: &Path, pipeline: &Pipeline, report: &RunReport) -> CliResult {
         let folder = tempfile::tempdir()?;
         write_maps(&folder.path().join("map.lat"), pipeline)?;
@@ -225,7 +225,7 @@ impl Replay {
         fleet::run(arguments)
     }
 
-    /// Options of one mapper for each lattice.
+    /// Mapper options per lattice.
     fn maps(&self) -> CliResult<Vec<MapperOptions>> {
         let params = self.params_of("lattice_mapper")?;
         let given = MapperOptions::from_params(&params)?;
@@ -262,7 +262,7 @@ impl Replay {
             (None, "") => None,
             (None, name) => Some(name.parse()?),
         };
-        // The topic of the parameters belongs to their source.
+        // The topic parameter belongs to the source parameter.
         let topic = match self.ins {
             Some(_) => String::new(),
             None => params.string("ins.topic", "")?,
@@ -283,7 +283,7 @@ impl Replay {
     }
 }
 
-/// File of the map of a lattice; of several its name goes before the ending.
+/// Map file of a lattice; with several its name precedes the extension.
 pub fn map_file(path: &Path, kind: LatticeKind, several: bool) -> PathBuf {
     let mut path = path.to_owned();
     if several {
@@ -301,7 +301,7 @@ fn write_maps(path: &Path, pipeline: &Pipeline) -> CliResult {
     for mapper in pipeline.mappers() {
         let path = map_file(path, mapper.list().lattice().kind(), several);
         let map = mapper.contents();
-        whole::write(&path, |file| map.write(file, &WriteOptions::default()))?;
+        atomic_write::write(&path, |file| map.write(file, &WriteOptions::default()))?;
     }
     Ok(())
 }

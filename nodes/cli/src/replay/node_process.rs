@@ -1,4 +1,4 @@
-//! One node in a process of its own: started, listened to, ended.
+//! A node in a separate process.
 
 use std::collections::BTreeSet;
 use std::error::Error;
@@ -16,18 +16,18 @@ use crate::CliResult;
 use lattice_nodes::report;
 use lattice_runtime::LoopbackDomain;
 
-/// Setting that a warning of a short receive buffer names.
+/// Setting named in a warning about a short receive buffer.
 const BUFFER_SETTING: &str = "net.core.rmem_max";
-/// Such a warning of a node; it matters where something is lost.
+/// Such a warning of a node; it is shown after a loss.
 static SHORT_BUFFER: Mutex<Option<String>> = Mutex::new(None);
-/// Texts of warnings that are remembered.
+/// Limit of stored warning texts.
 const MAX_TEXTS: usize = 1000;
-/// Time for all nodes to find each other, also on a busy machine.
+/// Discovery timeout, also for a busy machine.
 const MATCH_TIME: Duration = Duration::from_secs(60);
-/// Time for a node to work off its inbox at its end.
+/// Timeout for a node to process its inbox at its end.
 const END_TIME: Duration = Duration::from_secs(300);
 
-/// A node in a process of its own, and what it logs.
+/// A node in a separate process, and its log.
 pub struct NodeProcess {
     name: String,
     child: Child,
@@ -38,7 +38,7 @@ pub struct NodeProcess {
 }
 
 impl NodeProcess {
-    /// Starts a node, or several with commas between in one process.
+    /// Starts a node, or several, separated by commas, in one process.
     pub fn start(
         node: &str,
         namespace: Option<&str>,
@@ -71,7 +71,7 @@ impl NodeProcess {
         for remap in replay.remaps() {
             command.args(["-r", &remap]);
         }
-        // The first of several writes the report.
+        // The first of several nodes writes the report.
         let first = nodes.first().copied().unwrap_or_default();
         let report_file = param(&format!("{first}:report_file"), &yaml_text(report));
         let given = replay.options.params_for(&nodes)?;
@@ -85,8 +85,8 @@ impl NodeProcess {
         Self::spawn(command, what, &replay.domain, report)
     }
 
-    /// Starts a command that runs nodes, one of which writes this report, on a domain of loopback, whatever domain
-    /// and peers the environment names.
+    /// Starts a command that runs nodes, one of which writes this report, on a loopback domain, regardless of the domain
+    /// and peers in the environment.
     pub fn spawn(
         mut command: Command,
         what: String,
@@ -116,7 +116,7 @@ impl NodeProcess {
         })
     }
 
-    /// Waits until the node has logged a line with this text, and gives the line.
+    /// Waits until the node has logged a line with this text, and returns the line.
     pub fn expect(&mut self, text: &str) -> CliResult<String> {
         let deadline = Instant::now() + MATCH_TIME;
         loop {
@@ -142,7 +142,7 @@ impl NodeProcess {
         }
     }
 
-    /// Waits for the player's end; reports its progress.
+    /// Waits for the end of the player; reports its progress.
     pub fn played(mut self, progress: &mut dyn FnMut(f64)) -> CliResult {
         while let Ok(line) = self.lines.recv() {
             let share = line.rsplit_once("played ").map(|(_, share)| share);
@@ -160,11 +160,11 @@ impl NodeProcess {
         }
     }
 
-    /// Ends the node, waits for that, and reads its report.
+    /// Ends the node, waits for it, and reads its report.
     pub fn end<T: for<'de> serde::Deserialize<'de>>(mut self) -> CliResult<T> {
         interrupt(&self.child)?;
         let deadline = Instant::now() + END_TIME;
-        // The log ends when the process does.
+        // The log ends with the process.
         loop {
             match self.lines.recv_deadline(deadline) {
                 Ok(line) => self.seen.push(line),
@@ -186,12 +186,12 @@ impl NodeProcess {
     fn ended(&mut self, status: ExitStatus) -> Box<dyn Error + Send + Sync> {
         self.seen.extend(self.lines.try_iter());
         let words = self.seen.last().map_or("", String::as_str);
-        format!("{} ended with {status}; its last words: {words}", self.name).into()
+        format!("{} ended with {status}; last log lines: {words}", self.name).into()
     }
 }
 
 impl Drop for NodeProcess {
-    /// Leaves no process behind when a replay fails half-way.
+    /// Ends the process if a replay fails.
     fn drop(&mut self) {
         if let Ok(None) = self.child.try_wait() {
             let _ = self.child.kill();
@@ -203,7 +203,7 @@ impl Drop for NodeProcess {
     }
 }
 
-/// Passes the log of a node on, warnings to our own log.
+/// Forwards the log of a node: warnings to our own log.
 fn forward(
     stderr: impl io::Read + Send + 'static,
     name: String,
@@ -211,10 +211,10 @@ fn forward(
 ) -> JoinHandle<()> {
     thread::spawn(move || {
         for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-            // Twelve processes say the same of one machine: it is shown once.
+            // Warnings of several processes on one machine are shown once.
             let text = line.rsplit_once("]: ").map_or(&*line, |(_, text)| text);
             let warning = line.contains("[WARN]") || line.contains("[ERROR]");
-            // The player starts when all others have found each other.
+            // The player starts after discovery.
             let expected = text.starts_with("no publisher on ");
             if warning && text.contains(BUFFER_SETTING) {
                 let mut kept = SHORT_BUFFER.lock().unwrap_or_else(PoisonError::into_inner);
@@ -231,7 +231,7 @@ fn forward(
     })
 }
 
-/// Logs the warning of a node that its receive buffer is short, once something was lost.
+/// Logs a node's warning about its receive buffer, after a loss.
 pub fn warn_of_short_buffer() {
     let kept = SHORT_BUFFER.lock();
     if let Some(text) = kept.unwrap_or_else(PoisonError::into_inner).take() {
@@ -246,7 +246,7 @@ fn first_time(text: &str) -> bool {
     seen.len() >= MAX_TEXTS || seen.insert(text.to_owned())
 }
 
-/// The signal of Ctrl-C.
+/// Sends SIGINT.
 fn interrupt(child: &Child) -> io::Result<()> {
     let pid = rustix::process::Pid::from_child(child);
     Ok(rustix::process::kill_process(

@@ -12,12 +12,12 @@ use super::Replay;
 use crate::CliResult;
 
 impl Replay {
-    /// Refuses names that no node of the replay knows.
+    /// Rejects names unknown to the nodes of the replay.
     pub(super) fn check_names(&self) -> CliResult {
         executables::check_names(&self.args()?, &self.nodes(), Files::Own)
     }
 
-    /// Nodes of the replay, with the readers of their parameters.
+    /// Nodes of the replay, with the declarations of their parameters.
     fn nodes(&self) -> Vec<NamedNode<'static>> {
         let mut names = vec![
             "enu_transformer",
@@ -47,8 +47,8 @@ impl Replay {
         Ok(Params::of_node(&self.args()?, node)?)
     }
 
-    /// The parameters of the command line that a process of these nodes takes: a node refuses those that it
-    /// does not know.
+    /// Command line parameters for a process of these nodes: a node rejects unknown
+    /// ones.
     pub(super) fn params_for(&self, nodes: &[&str]) -> CliResult<Vec<String>> {
         let mut unknown: Option<BTreeSet<String>> = None;
         for (node, declare) in self.nodes() {

@@ -1,4 +1,4 @@
-//! Replay over DDS: the player and one process for each node, on a loopback domain of their own.
+//! Replay over DDS: the player and one process per node, on a separate loopback domain.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -13,7 +13,7 @@ use super::{Replay, map_file};
 use crate::CliResult;
 use crate::progress::Progress;
 use lattice_bag::BagReader;
-use lattice_nodes::files::whole;
+use lattice_nodes::files::atomic_write;
 use lattice_nodes::replay::{LatticeReport, Role, RunReport, TopicPlan};
 use lattice_runtime::LoopbackDomain;
 
@@ -25,7 +25,7 @@ pub struct DdsReplay<'a> {
     pub reader: &'a BagReader,
     /// Roles of its topics.
     pub plan: &'a TopicPlan,
-    /// One map for each.
+    /// Lattices, one map each.
     pub lattices: Vec<Lattice>,
     /// Domain of the processes.
     pub domain: LoopbackDomain,
@@ -36,7 +36,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
     let progress = Progress::new("play");
     let scratch = tempfile::tempdir()?;
     let begin = Instant::now();
-    progress.say("nodes find each other");
+    progress.say("waiting for discovery");
     let mut branches = Vec::new();
     for lattice in &replay.lattices {
         let port = replay.viewer_port(lattice);
@@ -67,7 +67,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
     let mut pages: Vec<String> = branches.iter_mut().filter_map(|b| b.page.take()).collect();
     player.played(&mut |done| {
         progress.set(done);
-        // A page that is opened now has a map to show.
+        // A page opened now has a map to show.
         for page in pages.drain(..) {
             progress.print(&page);
         }
@@ -75,7 +75,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
     progress.set(1.0);
     progress.say("nodes end");
     let transformer = transformer.end()?;
-    // The branch with the page ends last, so that the page stays as long as it can.
+    // The branch with the page ends last, so that the page stays available.
     let (last, first): (Vec<_>, Vec<_>) =
         { branches.into_iter().enumerate() }.partition(|(_, branch)| branch.has_page);
     let ends = first.into_iter().chain(last);
@@ -101,7 +101,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
 }
 
 impl DdsReplay<'_> {
-    /// Port of the viewer if it shows this lattice: FCC, or else the first.
+    /// Port of the viewer for this lattice: FCC, or else the first.
     fn viewer_port(&self, lattice: &Lattice) -> Option<u16> {
         let mut all = self.lattices.iter().map(Lattice::kind);
         let first = all.clone().next();
@@ -111,7 +111,7 @@ impl DdsReplay<'_> {
             .filter(|_| shown == Some(lattice.kind()))
     }
 
-    /// Puts the maps that the mappers have saved where the user wants them.
+    /// Moves the maps saved by the mappers to the user's paths.
     fn keep_maps(&self, scratch: &Path, report: &RunReport) -> CliResult {
         let Some(path) = &self.options.map_out else {
             return Ok(());
@@ -119,13 +119,13 @@ impl DdsReplay<'_> {
         let several = self.lattices.len() > 1;
         for (lattice, report) in self.lattices.iter().zip(&report.lattices) {
             if report.map.voxels == 0 {
-                // A mapper saves no empty map.
+                // A mapper does not save an empty map.
                 continue;
             }
             let saved: PathBuf = scratch.join(saved_map(lattice.kind().name()));
             let mut saved = File::open(&saved).map_err(|e| format!("{}: {e}", saved.display()))?;
             let to = map_file(path, lattice.kind(), several);
-            whole::write(&to, |file| io::copy(&mut saved, file))?;
+            atomic_write::write(&to, |file| io::copy(&mut saved, file))?;
         }
         Ok(())
     }
@@ -139,7 +139,7 @@ impl DdsReplay<'_> {
         self.topic(|role| role == Role::Cloud)
     }
 
-    /// Topics of transforms that are not named as the nodes name them, with the names that they get.
+    /// Remap rules for transform topics with other names than the nodes use.
     pub fn remaps(&self) -> Vec<String> {
         let named = [("/tf", false), ("/tf_static", true)];
         let remaps = named.into_iter().flat_map(|(name, is_static)| {
@@ -181,7 +181,7 @@ impl DdsReplay<'_> {
         let mut arguments = vec![
             param("bag", &yaml_text(&self.options.bag)),
             param("rate", &format!("{:?}", self.options.rate)),
-            // Nothing may be lost.
+            // No message may be skipped.
             param("max_wait_s", "600.0"),
             param("keyboard", "false"),
             param("topics", &quoted(&wanted)),
@@ -194,17 +194,17 @@ impl DdsReplay<'_> {
     }
 }
 
-/// Name of the file that the mapper of a lattice saves its map to.
+/// File name of the saved map of a lattice.
 fn saved_map(name: &str) -> String {
     format!("{name}.lattice")
 }
 
-/// A parameter as `-p` takes it.
+/// Parameter in the form of `-p`.
 pub fn param(name: &str, value: &str) -> String {
     format!("{name}:={value}")
 }
 
-/// A path as YAML text.
+/// Path as YAML text.
 pub fn yaml_text(path: &Path) -> String {
     format!("'{}'", path.display().to_string().replace('\'', "''"))
 }
@@ -215,13 +215,13 @@ pub fn quoted(names: &[&str]) -> String {
     format!("[{}]", names.join(", "))
 }
 
-/// One map and its markers.
+/// One map with its markers.
 struct Branch {
     namespace: String,
     mapper: NodeProcess,
     markers: NodeProcess,
     has_page: bool,
-    /// Line that says where the page is.
+    /// Line with the URL of the page.
     page: Option<String>,
 }
 
@@ -243,7 +243,7 @@ impl Branch {
             param("lattice", name),
             param("cell_volume_m3", &format!("{:?}", lattice.cell_volume_m3())),
             param("map_frame", &replay.plan.map_frame),
-            // In place of one in a file.
+            // Overrides one from a file.
             param("cell_size_m", "0.0"),
             param("qos./points_enu.reliability", "reliable"),
             param("qos./points_enu.depth", "512"),
@@ -253,13 +253,13 @@ impl Branch {
             params.extend([
                 param("map_dir", &yaml_text(scratch)),
                 param("autosave_file", &saved_map(name)),
-                // Only at the end.
+                // Saved at the end only.
                 param("autosave_period_s", "86400.0"),
             ]);
         }
         let mapper = start("lattice_mapper", params)?;
         let mut markers = match viewer_port {
-            // In one process: twelve find each other, and five lattices need them all.
+            // In one process: loopback discovery is limited to twelve participants, which five lattices need.
             Some(port) => {
                 let port = param("viewer_server:port", &port.to_string());
                 start("voxel_marker_publisher,viewer_server", vec![port])?

@@ -200,13 +200,13 @@ fn faults_are_one_line() {
         ),
         (
             [&common[..], &["--min-inliers", "40"]].concat(),
-            "--min-inliers 40 is not from 0 to 1",
+            "--min-inliers 40 is outside 0 to 1",
         ),
         ([&common[..], &["--labels", &map]].concat(), "map.ply: "),
         ([&common[..], &["--confusion", &map]].concat(), "map.ply: "),
         (
             [&common[..], &["--cell", "0"]].concat(),
-            "--cell 0 is no length over 0",
+            "--cell 0 is not above 0",
         ),
     ] {
         let text = error(&[&["calibrate"], &arguments[..]].concat());

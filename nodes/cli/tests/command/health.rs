@@ -109,7 +109,7 @@ fn a_mapper_is_not_well_until_it_has_mapped_a_cloud() {
             assert!(begin.elapsed() < PATIENCE, "{expected}: {said}");
         }
     };
-    until(false, "s ago: none came on /points_enu");
+    until(false, "s ago: none received on /points_enu");
     let begin =
         "WARN lattice_mapper: inputs: no publisher on /points_enu (sensor_msgs/msg/PointCloud2)";
     until(false, begin);
@@ -123,7 +123,7 @@ fn a_mapper_is_not_well_until_it_has_mapped_a_cloud() {
     });
     until(
         false,
-        "the last was refused: cloud in frame 'velodyne', expected 'map'",
+        "the last rejected: cloud in frame 'velodyne', expected 'map'",
     );
     *frame.lock().unwrap() = "map";
     until(true, "OK lattice_mapper: inputs: publishers on all topics");

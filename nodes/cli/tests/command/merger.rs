@@ -16,12 +16,14 @@ use lattice_nodes::map_follower::{Followed, MapFollower};
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Node, Publisher, Runtime, Subscription};
+use lattice_runtime::{
+    LoopbackDomain, Node, Publisher, Runtime, Subscription, SubscriptionExecutor,
+};
 
 use crate::PATIENCE;
 use crate::record::{signal, start};
 
-enum Heard {
+enum MapEvent {
     Map(Arc<LatticeMap>),
     Update(Arc<LatticeMapUpdate>),
 }
@@ -29,7 +31,7 @@ enum Heard {
 /// A map of one namespace.
 struct Listener {
     follower: MapFollower,
-    heard: Receiver<Heard>,
+    heard: Receiver<MapEvent>,
     request: Publisher<lattice_msgs::std_msgs::Empty>,
     _subscriptions: [Subscription; 2],
 }
@@ -43,12 +45,17 @@ impl Listener {
             format!("{namespace}/map_updates"),
         );
         let subscriptions = [
-            node.subscribe(&map, Qos::MAP, Load::Small, move |m| {
-                drop(maps.send(Heard::Map(m)))
+            node.subscribe(&map, Qos::MAP, SubscriptionExecutor::Shared, move |m| {
+                drop(maps.send(MapEvent::Map(m)))
             }),
-            node.subscribe(&updates, Qos::DELTAS, Load::Small, move |m| {
-                drop(sender.send(Heard::Update(m)));
-            }),
+            node.subscribe(
+                &updates,
+                Qos::DELTAS,
+                SubscriptionExecutor::Shared,
+                move |m| {
+                    drop(sender.send(MapEvent::Update(m)));
+                },
+            ),
         ];
         let asked = format!("{namespace}/{mapper}/request_keyframe");
         Self {
@@ -64,8 +71,8 @@ impl Listener {
         let mut wait = Duration::from_millis(20);
         loop {
             let followed = match self.heard.recv_timeout(wait) {
-                Ok(Heard::Map(message)) => self.follower.on_map(&message),
-                Ok(Heard::Update(message)) => self.follower.on_update(&message),
+                Ok(MapEvent::Map(message)) => self.follower.on_map(&message),
+                Ok(MapEvent::Update(message)) => self.follower.on_update(&message),
                 Err(RecvTimeoutError::Timeout) => return,
                 Err(RecvTimeoutError::Disconnected) => panic!("the subscription has ended"),
             };
@@ -194,7 +201,12 @@ fn the_map_of_two_robots_stays_exact_when_one_begins_anew() {
     let (told, names_told) = channel();
     let told = move |info: Arc<LabelInfo>| drop(told.send(info));
     let _info = node
-        .subscribe("/label_info", Qos::LATCHED, Load::Small, told)
+        .subscribe(
+            "/label_info",
+            Qos::LATCHED,
+            SubscriptionExecutor::Shared,
+            told,
+        )
         .unwrap();
     let info = names_told.recv_timeout(PATIENCE).unwrap();
     let info = info.class_map.iter();

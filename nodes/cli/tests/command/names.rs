@@ -123,7 +123,7 @@ fn files_are_checked_by_section() {
     refused(
         &section("/**/latice_mapper", "lattice: bcc"),
         &all,
-        "names no node that there is; did you mean 'lattice_mapper'?",
+        "names an unknown node; did you mean 'lattice_mapper'?",
     );
     let two = section("/**/lattice_mapper", "lattice: bcc") + &section("/**", "latice: bcc");
     refused(&two, &all[..3], "did you mean 'lattice'?");

@@ -151,10 +151,7 @@ fn a_quantization_that_leaves_points_out_fails_and_labels_are_kept() {
     std::fs::write(&cloud, format!("{head}{rows}")).unwrap();
     let quantize = ["quantize", &cloud, "--lattice", "fcc", "--map-out", &map];
     let line = error(&[&quantize[..], &["--max-voxels", "5"]].concat());
-    assert!(
-        line.contains("55 points are beyond --max-voxels 5"),
-        "{line}"
-    );
+    assert!(line.contains("55 points exceed --max-voxels 5"), "{line}");
     assert!(!std::path::Path::new(&map).exists());
     text(&quantize);
     let options = lattice_nodes::files::points::PointFileOptions::default();

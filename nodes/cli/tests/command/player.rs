@@ -10,7 +10,7 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Runtime};
+use lattice_runtime::{LoopbackDomain, Runtime, SubscriptionExecutor};
 use serde_json::{Value, json};
 use wait_timeout::ChildExt;
 
@@ -123,7 +123,12 @@ fn in_lockstep_each_message_waits_for_the_answer_to_the_one_before() {
     let (told, clouds) = channel();
     let handler = move |cloud: Arc<PointCloud2>| drop(told.send(cloud));
     let qos = Qos::reliable(1000);
-    let _clouds = node.subscribe("/left/points", qos, Load::Large, handler);
+    let _clouds = node.subscribe(
+        "/left/points",
+        qos,
+        SubscriptionExecutor::Dedicated,
+        handler,
+    );
     // Far faster than anybody answers.
     let parameters = [
         "lockstep:=['/left/points', '/answers']",

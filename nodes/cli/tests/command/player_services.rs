@@ -16,7 +16,7 @@ use lattice_msgs::{RosService, cdr};
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Client, Load, LoopbackDomain, Node, Runtime, Subscription};
+use lattice_runtime::{Client, LoopbackDomain, Node, Runtime, Subscription, SubscriptionExecutor};
 use serde_json::{Value, json};
 use wait_timeout::ChildExt;
 
@@ -149,7 +149,8 @@ fn listens(node: &Node, topic: &str) -> (Subscription, Receiver<()>) {
     let qos = Qos::reliable(1000);
     let hear = move |_: Arc<PointCloud2>| _ = tell.send(());
     (
-        node.subscribe(topic, qos, Load::Large, hear).unwrap(),
+        node.subscribe(topic, qos, SubscriptionExecutor::Dedicated, hear)
+            .unwrap(),
         heard,
     )
 }

@@ -138,7 +138,7 @@ fn a_point_file_is_shown_in_cells_that_are_told() {
     }
     text(&["quantize", &points, "--map-out", &at("map.xyz")]);
     let told = error(&["view", &at("map.xyz"), "--cell-size", "1"]);
-    assert!(told.contains("--cell-size has no use here"), "{told}");
+    assert!(told.contains("--cell-size has no effect here"), "{told}");
 }
 
 #[test]

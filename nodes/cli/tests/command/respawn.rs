@@ -18,7 +18,7 @@ use lattice_nodes::map_follower::{Followed, MapFollower};
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Publisher, Runtime, Subscription};
+use lattice_runtime::{LoopbackDomain, Publisher, Runtime, Subscription, SubscriptionExecutor};
 
 use crate::PATIENCE;
 use crate::nodes::simulated;
@@ -80,7 +80,7 @@ fn spawn(domain: &LoopbackDomain, arguments: &[String]) -> Child {
     )
 }
 
-enum Heard {
+enum MapEvent {
     Map(std::sync::Arc<LatticeMap>),
     Update(std::sync::Arc<LatticeMapUpdate>),
 }
@@ -88,7 +88,7 @@ enum Heard {
 /// A follower of the map in the test's own process.
 struct Viewer {
     follower: MapFollower,
-    heard: Receiver<Heard>,
+    heard: Receiver<MapEvent>,
     request: Publisher<Empty>,
     _subscriptions: [Subscription; 2],
     _runtime: Runtime,
@@ -107,12 +107,17 @@ impl Viewer {
         let (sender, heard) = channel();
         let maps = sender.clone();
         let subscriptions = [
-            node.subscribe("map", Qos::MAP, Load::Small, move |m| {
-                drop(maps.send(Heard::Map(m)))
+            node.subscribe("map", Qos::MAP, SubscriptionExecutor::Shared, move |m| {
+                drop(maps.send(MapEvent::Map(m)))
             }),
-            node.subscribe("map_updates", Qos::DELTAS, Load::Small, move |m| {
-                drop(sender.send(Heard::Update(m)));
-            }),
+            node.subscribe(
+                "map_updates",
+                Qos::DELTAS,
+                SubscriptionExecutor::Shared,
+                move |m| {
+                    drop(sender.send(MapEvent::Update(m)));
+                },
+            ),
         ];
         Self {
             follower: MapFollower::new(usize::MAX),
@@ -143,8 +148,8 @@ impl Viewer {
                 .heard
                 .recv_timeout(std::time::Duration::from_millis(100))
             {
-                Ok(Heard::Map(message)) => self.follower.on_map(&message),
-                Ok(Heard::Update(message)) => self.follower.on_update(&message),
+                Ok(MapEvent::Map(message)) => self.follower.on_map(&message),
+                Ok(MapEvent::Update(message)) => self.follower.on_update(&message),
                 Err(_) => Ok(Followed::Old),
             };
             if followed.unwrap() == Followed::NeedKeyframe {

@@ -14,11 +14,11 @@ use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 use lattice_msgs::std_msgs::{self, Header};
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
-use lattice_nodes::viewer_server::{Class, Entry, Gate, Hub, Server};
+use lattice_nodes::viewer_server::{Broadcaster, Class, Entry, RequestAuth, Server};
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Runtime};
+use lattice_runtime::{LoopbackDomain, Runtime, SubscriptionExecutor};
 use serde_bytes::ByteBuf;
 use serde_json::{Map, Value, to_value};
 
@@ -87,25 +87,25 @@ fn known_map() -> LatticeMap {
 
 /// A server with one message on each channel, and these messages by their topics.
 fn server() -> (Server, Value) {
-    let hub = Arc::new(Hub::new(4));
+    let broadcaster = Arc::new(Broadcaster::new(4));
     let mut all = Map::new();
     let map = known_map();
-    hub.channel::<LatticeMap>("/map", Class::Map, false);
+    broadcaster.channel::<LatticeMap>("/map", Class::Map, false);
     all.insert("/map".to_owned(), to_value(&map).unwrap());
     let chunk = Entry {
         stamp_ns: 1,
         cdr: cdr::to_vec(&map).unwrap().into(),
         thin: None,
     };
-    hub.change_map(|stream| stream.set_keyframe(vec![chunk]));
+    broadcaster.change_map(|stream| stream.set_keyframe(vec![chunk]));
     let mut add = |topic: &str, channel: u32, message: Value, cdr: Vec<u8>| {
-        hub.offer(channel, cdr);
+        broadcaster.offer(channel, cdr);
         all.insert(topic.to_owned(), message);
     };
     macro_rules! kept {
         ($topic:literal, $message:expr) => {{
             let message = $message;
-            let channel = channel_of(&hub, $topic, &message);
+            let channel = channel_of(&broadcaster, $topic, &message);
             let cdr = cdr::to_vec(&message).unwrap();
             add($topic, channel, to_value(&message).unwrap(), cdr);
         }};
@@ -114,12 +114,12 @@ fn server() -> (Server, Value) {
     kept!("/map_centers", cloud());
     kept!("/tf", transforms());
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    let server = Server::start(address, Gate::default(), Arc::clone(&hub)).unwrap();
+    let server = Server::start(address, RequestAuth::default(), Arc::clone(&broadcaster)).unwrap();
     (server, Value::Object(all))
 }
 
-fn channel_of<M: RosMessage>(hub: &Hub, topic: &str, _: &M) -> u32 {
-    hub.channel::<M>(topic, Class::Newest { depth: 1 }, true)
+fn channel_of<M: RosMessage>(broadcaster: &Broadcaster, topic: &str, _: &M) -> u32 {
+    broadcaster.channel::<M>(topic, Class::Newest { depth: 1 }, true)
 }
 
 /// The same with all numbers as floating-point ones, the only kind that JavaScript writes.
@@ -219,7 +219,12 @@ fn the_protocols_own_client_sees_nodes_elsewhere_come_and_go() {
     let node = runtime.node("peer").unwrap();
     let ours = node.publisher::<std_msgs::Empty>("/from_peer", Qos::DEFAULT);
     let heard = |_: Arc<std_msgs::Empty>| {};
-    let theirs = node.subscribe("/to_peer", Qos::DEFAULT, Load::Small, heard);
+    let theirs = node.subscribe(
+        "/to_peer",
+        Qos::DEFAULT,
+        SubscriptionExecutor::Shared,
+        heard,
+    );
     assert!(ours.is_ok() && theirs.is_ok());
     let peer = ["/robot/peer"].as_slice();
     follow(lines, &mut known, |known| {

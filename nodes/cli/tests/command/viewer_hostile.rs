@@ -10,7 +10,7 @@ use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Runtime};
+use lattice_runtime::{LoopbackDomain, Runtime, SubscriptionExecutor};
 use serde_json::Value;
 
 use crate::PATIENCE;
@@ -38,7 +38,12 @@ fn what_hostile_clients_cost_is_counted() {
             let _ = tell.send((value.key.clone(), value.value.clone()));
         }
     };
-    let diagnostics = node.subscribe("/diagnostics", Qos::DIAGNOSTICS, Load::Small, hear);
+    let diagnostics = node.subscribe(
+        "/diagnostics",
+        Qos::DIAGNOSTICS,
+        SubscriptionExecutor::Shared,
+        hear,
+    );
     let _diagnostics = diagnostics.unwrap();
     let until = |key: &str, value: &str| {
         while told.recv_timeout(PATIENCE).unwrap() != (key.to_owned(), value.to_owned()) {}

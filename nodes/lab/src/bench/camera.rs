@@ -12,7 +12,7 @@ use lattice_nodes::executables;
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Publisher, Runtime};
+use lattice_runtime::{LoopbackDomain, Publisher, Runtime, SubscriptionExecutor};
 use serde::Serialize;
 
 use super::clock::process_cpu_s;
@@ -80,7 +80,12 @@ pub fn camera(setup: &CameraSetup) -> Result<CameraReport, AnyError> {
     let handler = move |cloud: Arc<PointCloud2>| {
         let _ = sender.send((cloud.header.stamp.to_ns(), cloud.width, Instant::now()));
     };
-    let clouds = node.subscribe("points", Qos::SCANS, Load::Large, handler)?;
+    let clouds = node.subscribe(
+        "points",
+        Qos::SCANS,
+        SubscriptionExecutor::Dedicated,
+        handler,
+    )?;
     let info = node.publisher::<CameraInfo>("rgb/camera_info", Qos::SCANS)?;
     let depth = node.publisher("depth_registered/image_rect", Qos::SCANS)?;
     let topic = ["labels/image", "rgb/image_rect_color"][usize::from(setup.has_model)];

@@ -3,7 +3,7 @@
 use super::points::{ScanRecord, scans_path};
 use crate::simulate::{Survey, SurveyPattern};
 use crate::{AnyError, at};
-use lattice_nodes::files::whole::WholeFile;
+use lattice_nodes::files::atomic_write::AtomicFile;
 use serde::Serialize;
 use std::fmt;
 use std::io::Write;
@@ -58,8 +58,8 @@ pub fn write_site(
 ) -> Result<SiteSummary, AnyError> {
     let survey = Survey::new(options.seed, options.pattern)?;
     let scans_out = scans_path(&options.out);
-    let mut points_file = WholeFile::create(&options.out).map_err(at(&options.out))?;
-    let mut scans_file = WholeFile::create(&scans_out).map_err(at(&scans_out))?;
+    let mut points_file = AtomicFile::create(&options.out).map_err(at(&options.out))?;
+    let mut scans_file = AtomicFile::create(&scans_out).map_err(at(&scans_out))?;
     let (mut points, mut scans, mut sum_m) = (0u64, 0u64, 0.0);
     for scan in survey.scans() {
         if points >= options.points {

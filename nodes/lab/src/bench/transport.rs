@@ -11,7 +11,7 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Node, Runtime};
+use lattice_runtime::{LoopbackDomain, Node, Runtime, SubscriptionExecutor};
 use serde::{Deserialize, Serialize};
 
 use super::clock::process_cpu_s;
@@ -136,7 +136,8 @@ pub fn listen(setup: TransportSetup, domain: u16) -> Result<(), AnyError> {
         let sent_ns = cloud.header.stamp.to_ns() as f64;
         let _ = sender.send(now().as_nanos() as f64 - sent_ns);
     };
-    let subscription = node.subscribe(TOPIC, setup.qos(), Load::Large, handler)?;
+    let subscription =
+        node.subscribe(TOPIC, setup.qos(), SubscriptionExecutor::Dedicated, handler)?;
     subscription.on_publisher_joined(move || {
         let _ = joins.send(());
     });

@@ -8,8 +8,8 @@ use lattice_core::pose::Axes;
 use lattice_core::registration::UNLABELED;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
 use lattice_core::voxels::label_names::write_named;
+use lattice_nodes::files::atomic_write;
 use lattice_nodes::files::export::write_labelled_ply;
-use lattice_nodes::files::whole;
 use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -175,12 +175,12 @@ pub fn write_house(
     summary.survey_points = survey.cloud.len();
     summary.voxels = list.len();
     let map = MapContents::from_list(&list);
-    whole::write(&place(options, MAP_FILE)?, |file| {
+    atomic_write::write(&place(options, MAP_FILE)?, |file| {
         write_named(&map, house.class_names(), file, &WriteOptions::default())
     })?;
     let classes = BTreeMap::from([("classes", house.class_names())]);
     let text = serde_yaml::to_string(&classes)?;
-    whole::write_text(&place(options, CLASSES_FILE)?, &text)?;
+    atomic_write::write_text(&place(options, CLASSES_FILE)?, &text)?;
     progress(1.0);
     Ok(summary)
 }
@@ -237,7 +237,7 @@ fn write_scene(
             HeadsetAxes::Ros => "metres, headset_origin: x forward, y left, z up",
             HeadsetAxes::Unity => "metres, headset_origin: x right, y up, z forward (left-handed)",
         };
-        whole::write(&path, |file| {
+        atomic_write::write(&path, |file| {
             write_labelled_ply(&points, &labels, comment, file)
         })?;
         let counts = &mut summary.headset_points;
@@ -248,5 +248,5 @@ fn write_scene(
         });
     }
     let path = place(options, &format!("{name}.json"))?;
-    whole::write(&path, |file| serde_json::to_writer_pretty(file, &truth))
+    atomic_write::write(&path, |file| serde_json::to_writer_pretty(file, &truth))
 }

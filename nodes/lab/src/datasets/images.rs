@@ -6,7 +6,7 @@ use crate::options::within;
 use crate::simulate::house::{House, RoomCamera, RoomImage, RoomImages, look_views, robot_views};
 use crate::{AnyError, at};
 use lattice_core::registration::UNLABELED;
-use lattice_nodes::files::whole;
+use lattice_nodes::files::atomic_write;
 use nalgebra::Isometry3;
 use png::{BitDepth, ColorType};
 use serde::{Deserialize, Serialize};
@@ -183,7 +183,7 @@ pub fn write_images(
             progress((at + 1) as f64 / options.count as f64);
         }
     }
-    whole::write(&list, |file| serde_json::to_writer_pretty(file, &set))?;
+    atomic_write::write(&list, |file| serde_json::to_writer_pretty(file, &set))?;
     let all = pixels.values().sum::<u64>().max(1) as f64;
     let name = |label: u8| {
         set.classes
@@ -293,7 +293,7 @@ fn write_png(
     bits: BitDepth,
     data: &[u8],
 ) -> Result<(), AnyError> {
-    whole::write(path, |file| -> Result<(), png::EncodingError> {
+    atomic_write::write(path, |file| -> Result<(), png::EncodingError> {
         let mut encoder = png::Encoder::new(file, width, height);
         encoder.set_color(kind);
         encoder.set_depth(bits);

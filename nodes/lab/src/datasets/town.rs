@@ -6,8 +6,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use lattice_core::registration::{SemanticCloud, UNLABELED};
+use lattice_nodes::files::atomic_write;
 use lattice_nodes::files::export::write_labelled_ply;
-use lattice_nodes::files::whole;
 use serde::Serialize;
 
 use super::house::CLASSES_FILE;
@@ -68,10 +68,10 @@ pub fn write_town(options: &TownOptions) -> Result<TownSummary, AnyError> {
         numbers.join(" ") + "\n"
     };
     let text: String = [0, 1, 2, 3].map(row).concat();
-    whole::write_text(&options.place("map_from_cloud.txt")?, &text)?;
+    atomic_write::write_text(&options.place("map_from_cloud.txt")?, &text)?;
     let classes = BTreeMap::from([("classes", BTreeMap::from(CLASSES))]);
     let text = serde_yaml::to_string(&classes)?;
-    whole::write_text(&options.place(CLASSES_FILE)?, &text)?;
+    atomic_write::write_text(&options.place(CLASSES_FILE)?, &text)?;
     let out = options.out.clone();
     Ok(TownSummary { out, points })
 }
@@ -80,7 +80,7 @@ fn write_scan(options: &TownOptions, name: &str, scan: &SemanticCloud) -> Result
     let labels = scan.labels.iter();
     let labels: Vec<u16> = labels.map(|l| l.top().unwrap_or(UNLABELED)).collect();
     let comment = "metres, sensor: x forward, y left, z up";
-    whole::write(&options.place(name)?, |file| {
+    atomic_write::write(&options.place(name)?, |file| {
         write_labelled_ply(&scan.points_m, &labels, comment, file)
     })
 }

@@ -10,8 +10,8 @@ use crate::simulate::{
     RANGE_NOISE_M, TURNTABLE_PERIOD_NS, base_from_imu,
 };
 use crate::{AnyError, at};
+use lattice_nodes::files::atomic_write::{self, AtomicFile};
 use lattice_nodes::files::export::ply_header;
-use lattice_nodes::files::whole::{self, WholeFile};
 use nalgebra::{Isometry3, Vector3};
 use serde_yaml::{Mapping, Value};
 use std::io::{Seek, SeekFrom, Write};
@@ -27,8 +27,8 @@ const PLY_HEADER_BYTES: usize = 256;
 
 /// The open files of a truth folder.
 pub(super) struct Truth {
-    poses: (PathBuf, WholeFile),
-    points: (PathBuf, WholeFile),
+    poses: (PathBuf, AtomicFile),
+    points: (PathBuf, AtomicFile),
     point_count: u64,
 }
 
@@ -39,10 +39,10 @@ impl Truth {
         std::fs::create_dir_all(&folder).map_err(at(&folder))?;
         let site = folder.join(SITE_FILE);
         let facts = serde_yaml::to_string(&site_facts(options)).map_err(at(&site))?;
-        whole::write_text(&site, &facts)?;
+        atomic_write::write_text(&site, &facts)?;
         let open = |name: &str| {
             let path = folder.join(name);
-            let file = WholeFile::create(&path).map_err(at(&path))?;
+            let file = AtomicFile::create(&path).map_err(at(&path))?;
             Ok::<_, AnyError>((path, file))
         };
         let (mut poses, mut points) = (open(POSES_FILE)?, open(POINTS_FILE)?);

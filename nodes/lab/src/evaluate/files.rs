@@ -4,8 +4,8 @@ use super::Scenario;
 use super::settings::Cell;
 use crate::{AnyError, at};
 use lattice_core::registration::{LabelDistribution, UNLABELED};
+use lattice_nodes::files::atomic_write::{self, write_text};
 use lattice_nodes::files::export::write_labelled_ply;
-use lattice_nodes::files::whole::{self, write_text};
 use nalgebra::Point3;
 use std::fs;
 use std::path::Path;
@@ -19,7 +19,7 @@ pub(super) fn write_cloud(
 ) -> Result<(), AnyError> {
     let labels = (0..points_m.len()).map(|i| label(i).top().unwrap_or(UNLABELED));
     let labels: Vec<u16> = labels.collect();
-    whole::write(path, |file| {
+    atomic_write::write(path, |file| {
         write_labelled_ply(points_m, &labels, comment, file)
     })
 }

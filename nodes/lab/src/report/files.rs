@@ -3,14 +3,14 @@
 use super::html::html;
 use super::{Cell, Report, Table};
 use crate::{AnyError, at};
-use lattice_nodes::files::whole;
+use lattice_nodes::files::atomic_write;
 use std::fs;
 use std::path::Path;
 
 /// Writes a report into a folder, which is made where it is missing; its files are replaced.
 pub fn write_report(report: &Report, folder: &Path) -> Result<(), AnyError> {
     fs::create_dir_all(folder).map_err(at(folder))?;
-    let put = |name: &str, text: &str| whole::write_text(&folder.join(name), text);
+    let put = |name: &str, text: &str| atomic_write::write_text(&folder.join(name), text);
     put(
         "report.json",
         &(serde_json::to_string_pretty(report)? + "\n"),

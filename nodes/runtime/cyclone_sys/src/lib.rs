@@ -1,7 +1,7 @@
-//! Functions of Eclipse Cyclone DDS 11.0 that the runtime calls, and topics of serialised bytes (`c/blob.h`).
+//! Functions of Eclipse Cyclone DDS 11.0 used by the runtime, and topics of serialized bytes (`c/blob.h`).
 //!
-//! Written by hand; `c/blob.c` asserts sizes, places and numbers. The functions are those of Cyclone's own headers, with
-//! the same names, and are documented there.
+//! Written by hand; `c/blob.c` asserts sizes, offsets and constants. The functions have the names of Cyclone's headers
+//! and are documented there.
 
 #![allow(non_camel_case_types)]
 // Names and meanings are Cyclone's.
@@ -103,7 +103,7 @@ pub struct dds_log_data_t {
     pub hdrsize: usize,
 }
 
-/// One sample among all: the GUID of its writer, or what the sender names in its place, and its number there.
+/// Identity of a sample: the GUID of its writer, or the endpoint named instead, and its number.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct lattice_identity {
@@ -111,7 +111,7 @@ pub struct lattice_identity {
     pub number: i64,
 }
 
-/// A sample that was taken. Its bytes, encapsulation header first, live until [`lattice_release`].
+/// A taken sample. Its bytes, encapsulation header first, are valid until [`lattice_release`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct lattice_sample {
@@ -119,7 +119,7 @@ pub struct lattice_sample {
     pub bytes: *const u8,
     pub length: usize,
     pub writer: dds_instance_handle_t,
-    /// 0: not known, as inside a process.
+    /// 0: unknown, as within a process.
     pub number: i64,
     pub has_related: bool,
     pub related: lattice_identity,

@@ -1,4 +1,4 @@
-//! The goals of an action server with their states, without I/O.
+//! Goal states of an action server, without I/O.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,22 +14,22 @@ use lattice_msgs::unique_identifier_msgs::UUID;
 
 use super::ActionLimits;
 
-/// An identifier that names no goal.
+/// Goal id reserved for "no goal".
 const NO_ID: UUID = UUID { uuid: [0; 16] };
 
-/// Reason why a goal was not taken.
+/// Reason for rejecting a goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Refused {
-    /// There is a goal of this identifier, or it is zero.
+    /// The goal id is zero or in use.
     Id,
-    /// As many goals are at work as may be.
+    /// The limit of active goals is reached.
     Full,
 }
 
-/// A goal from its acceptance until its result is forgotten. `W` waits for the result.
+/// A goal from its acceptance until its result expires. `W` identifies a client that waits for the result.
 struct Goal<A: RosAction, W> {
     info: GoalInfo,
-    /// True for a goal that was taken for good; clients hear of no other.
+    /// True after confirmation. Clients see confirmed goals only.
     confirmed: bool,
     status: i8,
     canceled: Arc<AtomicBool>,
@@ -37,13 +37,13 @@ struct Goal<A: RosAction, W> {
     waiting: Vec<W>,
 }
 
-/// All goals that a server knows.
+/// All goals of a server.
 pub(super) struct Goals<A: RosAction, W> {
     limits: ActionLimits,
     goals: BTreeMap<UUID, Goal<A, W>>,
 }
 
-/// The status and the result of a goal.
+/// Status and result of a goal.
 pub(super) type Ended<A> = (i8, <A as RosAction>::Result);
 
 impl<A: RosAction, W> Goals<A, W> {
@@ -54,8 +54,7 @@ impl<A: RosAction, W> Goals<A, W> {
         }
     }
 
-    /// Takes a goal, until it is confirmed or forgotten; the flag it gives is set when the goal is to
-    /// be canceled.
+    /// Accepts a goal until it is confirmed or removed; returns its cancellation flag.
     pub fn accept(&mut self, goal_id: UUID, stamp: Time) -> Result<Arc<AtomicBool>, Refused> {
         if goal_id == NO_ID || self.goals.contains_key(&goal_id) {
             return Err(Refused::Id);
@@ -77,19 +76,19 @@ impl<A: RosAction, W> Goals<A, W> {
         Ok(canceled)
     }
 
-    /// A goal is taken for good.
+    /// Confirms an accepted goal.
     pub fn confirm(&mut self, goal_id: UUID) {
         if let Some(goal) = self.goals.get_mut(&goal_id) {
             goal.confirmed = true;
         }
     }
 
-    /// Takes a goal back that was not wanted after all.
+    /// Removes an accepted goal that was not confirmed.
     pub fn forget(&mut self, goal_id: UUID) {
         self.goals.remove(&goal_id);
     }
 
-    /// A goal is at work. False: nothing has changed.
+    /// Sets a goal to executing. False: the status did not change.
     pub fn execute(&mut self, goal_id: UUID) -> bool {
         let goal = self.goals.get_mut(&goal_id);
         let waits = |goal: &&mut Goal<A, W>| goal.status == GoalStatus::STATUS_ACCEPTED;
@@ -100,7 +99,7 @@ impl<A: RosAction, W> Goals<A, W> {
         true
     }
 
-    /// A goal has ended; gives those who wait for it. Only the first end counts.
+    /// Ends a goal; returns the clients that wait for its result. Later calls change nothing.
     pub fn end(&mut self, goal_id: UUID, ended: Ended<A>, now: Instant) -> Vec<W> {
         let goal = self.goals.get_mut(&goal_id);
         let Some(goal) = goal.filter(|goal| goal.ended.is_none()) else {
@@ -114,7 +113,7 @@ impl<A: RosAction, W> Goals<A, W> {
         waiting
     }
 
-    /// Asks goals to end early; gives those that had not been asked before.
+    /// Requests cancellation; returns the goals that were not canceling before.
     pub fn cancel(&mut self, request: &CancelGoalRequest) -> (CancelGoalResponse, Vec<UUID>) {
         let GoalInfo { goal_id, stamp } = request.goal_info;
         let all = goal_id == NO_ID && stamp == Time::default();
@@ -139,8 +138,7 @@ impl<A: RosAction, W> Goals<A, W> {
         (response, new)
     }
 
-    /// The result of a goal to whoever asks, now or, with `None`, at its end. A goal that is not known
-    /// has the status unknown and an empty result.
+    /// Result of a goal, or `None` until it ends. An unknown goal has the status unknown and an empty result.
     pub fn result(&mut self, goal_id: UUID, asks: W) -> Option<(W, Ended<A>)> {
         let unknown = (GoalStatus::STATUS_UNKNOWN, A::Result::default());
         let Some(goal) = self.goals.get_mut(&goal_id) else {
@@ -156,7 +154,7 @@ impl<A: RosAction, W> Goals<A, W> {
         None
     }
 
-    /// States of all goals.
+    /// Status of all goals.
     pub fn status(&self) -> GoalStatusArray {
         let status = |goal: &Goal<A, W>| GoalStatus {
             goal_info: goal.info,
@@ -168,7 +166,7 @@ impl<A: RosAction, W> Goals<A, W> {
         }
     }
 
-    /// Forgets results that are too old or too many. True: some went.
+    /// Removes results that are too old or too many. True: at least one was removed.
     pub fn expire(&mut self, now: Instant) -> bool {
         let before = self.goals.len();
         let age = self.limits.keep_results;
@@ -192,7 +190,7 @@ impl Default for ActionLimits {
             max_live: 8,
             max_results: 32,
             max_waiting: 8,
-            // As rcl.
+            // Default of rcl.
             keep_results: Duration::from_secs(15 * 60),
         }
     }

@@ -1,4 +1,4 @@
-//! Servers of actions: three services and two topics for each, with the names and qualities of ROS.
+//! Action servers: three services and two topics for each, with the names and QoS of ROS.
 
 mod goals;
 
@@ -20,19 +20,19 @@ use super::qos::Qos;
 use super::service::{Reply, Server};
 use super::sync::lock;
 
-/// Requests of `get_result` that wait at a time, at most.
+/// Limit of pending `get_result` requests.
 const MAX_WAITING_REQUESTS: usize = 64;
 
-/// Bounds of an action server.
+/// Limits of an action server.
 #[derive(Clone, Copy, Debug)]
 pub struct ActionLimits {
-    /// Goals that have not ended; more are rejected.
+    /// Goals that have not ended; further goals are rejected.
     pub max_live: usize,
-    /// Results; the oldest go.
+    /// Stored results; the oldest are removed.
     pub max_results: usize,
-    /// Clients that wait for the result of one goal; more get the status unknown.
+    /// Pending result requests of one goal; further clients receive the status unknown.
     pub max_waiting: usize,
-    /// Time in which a result can be asked for.
+    /// Lifetime of a result.
     pub keep_results: Duration,
 }
 
@@ -48,7 +48,7 @@ struct Shared<A: RosAction> {
 
 impl<A: RosAction> Shared<A> {
     fn publish_status(&self, goals: &Goals<A, ResultReply<A>>) {
-        // Under the lock, so that the last message tells the last state.
+        // Published under the lock, so that messages keep the order of the states.
         if let Err(error) = self.status.publish(goals.status()) {
             log::debug!("{}: {error}", self.name);
         }
@@ -65,7 +65,7 @@ impl<A: RosAction> Shared<A> {
     }
 }
 
-/// A goal that was accepted. One that is dropped without an end is aborted.
+/// An accepted goal. Dropping it without an end aborts it.
 pub struct GoalHandle<A: RosAction> {
     shared: Arc<Shared<A>>,
     goal_id: UUID,
@@ -74,12 +74,12 @@ pub struct GoalHandle<A: RosAction> {
 }
 
 impl<A: RosAction> GoalHandle<A> {
-    /// Its identifier.
+    /// Goal id.
     pub fn id(&self) -> UUID {
         self.goal_id
     }
 
-    /// True once a client wants the goal to end early.
+    /// True after a client has requested cancellation.
     pub fn is_canceled(&self) -> bool {
         self.canceled.load(Relaxed)
     }
@@ -100,17 +100,17 @@ impl<A: RosAction> GoalHandle<A> {
         }
     }
 
-    /// The goal is reached.
+    /// Ends the goal as succeeded.
     pub fn succeed(self, result: A::Result) {
         self.end(GoalStatus::STATUS_SUCCEEDED, result);
     }
 
-    /// The goal cannot be reached.
+    /// Ends the goal as aborted.
     pub fn abort(self, result: A::Result) {
         self.end(GoalStatus::STATUS_ABORTED, result);
     }
 
-    /// The goal has ended early, as was asked.
+    /// Ends the goal as canceled.
     pub fn cancel(self, result: A::Result) {
         self.end(GoalStatus::STATUS_CANCELED, result);
     }
@@ -137,7 +137,7 @@ pub struct Feedback<A: RosAction> {
 }
 
 impl<A: RosAction> Feedback<A> {
-    /// Publishes feedback; what finds the queue full is left out.
+    /// Publishes feedback; drops it if the queue is full.
     pub fn send(&self, feedback: A::Feedback) {
         let message = A::feedback(self.goal_id, feedback);
         if let Err(error) = self.publisher.publish(message) {
@@ -159,7 +159,7 @@ impl<A: RosAction> ActionServer<A> {
         &self.shared.name
     }
 
-    /// Forgets results that are too old; to be called now and then.
+    /// Removes expired results; call it regularly.
     pub fn expire(&self) {
         let mut goals = lock(&self.shared.goals);
         if goals.expire(Instant::now()) {
@@ -171,8 +171,8 @@ impl<A: RosAction> ActionServer<A> {
 impl Node {
     /// Serves `A`. Both handlers run on the io thread and must return at once.
     ///
-    /// `accept` is given each new goal; `false` rejects it.
-    /// `canceled` hears of each goal that a client wants to end early; the goal goes on until its handle
+    /// `accept` receives each new goal; `false` rejects it.
+    /// `canceled` receives each goal whose cancellation is requested. The goal stays active until its handle
     /// ends it.
     pub fn action_server<A: RosAction>(
         &self,

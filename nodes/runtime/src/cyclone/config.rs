@@ -1,4 +1,4 @@
-//! Configuration of Cyclone from the settings of ROS, with what `CYCLONEDDS_URI` adds.
+//! Configuration of Cyclone from the settings of ROS and `CYCLONEDDS_URI`.
 
 use std::process;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -6,19 +6,19 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use crate::env::Network;
 use crate::port::RECEIVE_BUFFER_BYTES;
 
-/// Participants that are looked for on a machine where multicast does not reach them. Others
-/// look for fewer, but answer whoever finds them.
+/// Participant indices to probe on a host without multicast. Other implementations probe fewer, but answer
+/// any probe.
 const MAX_PARTICIPANTS: u32 = 120;
 
-/// Between two announcements of the participant: who was stopped for longer than its lease is known
-/// again so soon.
+/// Period of participant announcements (SPDP). A participant suspended for longer than its lease is
+/// rediscovered within this time.
 const ANNOUNCEMENT_PERIOD: &str = "2s";
 
-/// Time after the match at which a reader asks its writer where it stands. Cyclone's own 10 ms are most of what
-/// a request that overtakes discovery waits.
+/// Delay of a reader's first ACKNACK after the match. Cyclone's default of 10 ms dominates the latency of a
+/// request that arrives before discovery has finished.
 const FIRST_QUESTION: &str = "1ms";
 
-/// The text for `dds_create_domain`: fragments separated by commas, of which the later ones win.
+/// Argument of `dds_create_domain`: comma-separated fragments, of which later ones override earlier ones.
 pub(super) fn config(network: &Network, cyclonedds_uri: Option<&str>) -> String {
     let general = match network.localhost_only {
         true => {
@@ -35,7 +35,7 @@ pub(super) fn config(network: &Network, cyclonedds_uri: Option<&str>) -> String 
         .iter()
         .map(|peer| format!("<Peer Address=\"{peer}\"/>"))
         .collect();
-    // Without an index the ports are any, and whoever comes upon them has another tag.
+    // Without an index any port is used; a separate tag keeps other participants out.
     let (index, tag) = match network.discovery_off {
         true => ("none", format!("<Tag>{}</Tag>", own_tag())),
         false => ("auto", String::new()),
@@ -56,7 +56,7 @@ pub(super) fn config(network: &Network, cyclonedds_uri: Option<&str>) -> String 
     }
 }
 
-/// A tag of discovery that no other process has.
+/// Discovery tag unique to this process.
 fn own_tag() -> String {
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
     let nanoseconds = since_1970.unwrap_or_default().as_nanos();

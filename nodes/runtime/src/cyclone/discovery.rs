@@ -1,5 +1,4 @@
-//! Endpoints of other participants that do not go with ours, which Cyclone passes over in silence where
-//! the types differ.
+//! Incompatible endpoints of other participants. Cyclone reports none where the types differ.
 
 use std::borrow::Cow;
 use std::ffi::{CStr, c_char, c_void};
@@ -19,23 +18,23 @@ use super::endpoint::{Description, Endpoint, Side};
 use super::entity::{Entity, endpoint_id};
 use super::names::role;
 use super::qos::{announced, user_data};
-use super::strangers::Strangers;
+use super::unauthenticated_participants::UnauthenticatedParticipants;
 use crate::port::{DURABILITY_CONFLICT, EndpointId, PortEvent, RELIABILITY_CONFLICT};
 use crate::qos::{Durability, Reliability};
 use crate::remote::RemotePublisher;
 use crate::sync::lock;
 
-/// Endpoints taken at a time.
+/// Endpoints taken per call.
 const BATCH: usize = 64;
 
-/// Our endpoints, and the readers of Cyclone's built-in topics that compare others with them.
+/// Local endpoints, and readers of Cyclone's built-in topics that check remote endpoints against them.
 pub(super) struct Discovery {
-    // Deleted before what their listeners point to.
+    // Deleted before the objects that their listeners refer to.
     readers: Mutex<Vec<Entity>>,
     participant: EndpointId,
     ours: Mutex<Vec<Weak<Endpoint>>>,
     events: Sender<PortEvent>,
-    strangers: Option<Strangers>,
+    unauthenticated_participants: Option<UnauthenticatedParticipants>,
 }
 
 /// An endpoint of another participant.
@@ -48,27 +47,29 @@ struct Other<'a> {
 }
 
 impl Discovery {
-    /// `secured`: not everybody is let in.
+    /// `secured`: DDS Security is enabled.
     pub(super) fn start(
         participant: &Entity,
         events: Sender<PortEvent>,
         secured: bool,
     ) -> Result<Arc<Self>, String> {
-        let strangers = secured.then(|| Strangers::watch(participant)).transpose()?;
+        let unauthenticated_participants = secured
+            .then(|| UnauthenticatedParticipants::watch(participant))
+            .transpose()?;
         let this = Arc::new(Self {
             readers: Mutex::default(),
             participant: participant.id()?,
             ours: Mutex::default(),
             events,
-            strangers,
+            unauthenticated_participants,
         });
         for (topic, listener) in [
             (DDS_BUILTIN_TOPIC_DCPSPUBLICATION, on_writers as Listener),
             (DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, on_readers),
         ] {
             let arg = Arc::as_ptr(&this).cast_mut().cast::<c_void>();
-            // SAFETY: handles; the listener is made, copied and deleted here; `this` outlives the
-            // readers, which it owns.
+            // SAFETY: handles; the listener is created, copied and deleted here; `this` owns the readers and
+            // outlives them.
             let made = unsafe {
                 let heard = dds_create_listener(ptr::null_mut());
                 let _ = dds_lset_data_available_arg(heard, Some(listener), arg, true);
@@ -81,12 +82,14 @@ impl Discovery {
         Ok(this)
     }
 
-    /// Participants that are not let in.
-    pub(super) fn strangers(&self) -> usize {
-        self.strangers.as_ref().map_or(0, Strangers::count)
+    /// Number of unauthenticated participants.
+    pub(super) fn unauthenticated_participants(&self) -> usize {
+        self.unauthenticated_participants
+            .as_ref()
+            .map_or(0, UnauthenticatedParticipants::count)
     }
 
-    /// Compares an endpoint of ours with those that are there, and with those to come.
+    /// Checks a local endpoint against all remote endpoints, present and future.
     pub(super) fn announce(&self, participant: &Entity, ours: &Arc<Endpoint>) {
         let mut all = lock(&self.ours);
         all.retain(|ours| ours.strong_count() > 0);
@@ -96,7 +99,7 @@ impl Discovery {
             Side::Writer => (DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, Side::Reader),
             Side::Reader => (DDS_BUILTIN_TOPIC_DCPSPUBLICATION, Side::Writer),
         };
-        // SAFETY: handles; a new reader of a built-in topic finds all that are known.
+        // SAFETY: handles; a new reader of a built-in topic receives all known endpoints.
         let made =
             unsafe { dds_create_reader(participant.handle(), topic, ptr::null(), ptr::null()) };
         if let Ok(reader) = Entity::new(made) {
@@ -130,12 +133,12 @@ impl Discovery {
         }
     }
 
-    /// Tells of a publisher.
+    /// Emits the event of a discovered publisher.
     fn found(&self, other: &Other<'_>) {
         let (Ok(name), Ok(type_name)) = (other.name.to_str(), other.type_name.to_str()) else {
             return;
         };
-        // The default of DDS where it does not say.
+        // Defaults of DDS where the policy is not announced.
         let qos = other
             .qos
             .unwrap_or((Reliability::Reliable, Durability::Volatile));
@@ -167,10 +170,10 @@ impl Discovery {
         }
     }
 
-    /// Gives all new endpoints of other participants to `each`; those that have gone become events.
+    /// Passes new endpoints of other participants to `each`; emits events for removed ones.
     fn take(&self, reader: dds_entity_t, each: &mut dyn FnMut(&Other<'_>)) {
         take_all(reader, &mut |sample, alive| {
-            // SAFETY: the readers here are of endpoints; this one is lent during the call.
+            // SAFETY: these readers return endpoints; each is valid during the call.
             unsafe {
                 if let Some(endpoint) = sample.cast::<dds_builtintopic_endpoint_t>().as_ref() {
                     self.sort(endpoint, alive, each);
@@ -181,7 +184,7 @@ impl Discovery {
 
     /// # Safety
     ///
-    /// The endpoint is one that Cyclone has lent.
+    /// The endpoint is on loan from Cyclone.
     unsafe fn sort(
         &self,
         endpoint: &dds_builtintopic_endpoint_t,
@@ -189,15 +192,15 @@ impl Discovery {
         each: &mut dyn FnMut(&Other<'_>),
     ) {
         let id = endpoint_id(endpoint.key);
-        if id.is_beside(&self.participant) {
+        if id.same_participant(&self.participant) {
             return;
         }
         if !alive {
             let _ = self.events.try_send(PortEvent::Lost { peer: id });
             return;
         }
-        if let Some(strangers) = &self.strangers {
-            strangers.shows_itself(id);
+        if let Some(unauthenticated_participants) = &self.unauthenticated_participants {
+            unauthenticated_participants.mark_authenticated(id);
         }
         // SAFETY: strings and QoS are null or live as long as the endpoint.
         let (name, type_name, qos, user_data) = unsafe {
@@ -217,37 +220,37 @@ impl Discovery {
 
 impl Drop for Discovery {
     fn drop(&mut self) {
-        // Their listeners use the rest.
+        // Listeners use the other fields.
         lock(&self.readers).clear();
     }
 }
 
-/// Takes all samples of a reader of a built-in topic. Each is lent to `each`, with whether it is alive.
+/// Takes all samples of a built-in topic. Passes each to `each` with true if its instance is alive.
 pub(super) fn take_all(reader: dds_entity_t, each: &mut dyn FnMut(*const c_void, bool)) {
     loop {
         let mut found = [ptr::null_mut::<c_void>(); BATCH];
         let mut infos = [MaybeUninit::<dds_sample_info_t>::uninit(); BATCH];
         let places = (found.as_mut_ptr(), infos.as_mut_ptr().cast());
-        // SAFETY: room for a batch; the first place is null, so that samples are lent.
+        // SAFETY: space for a batch; a null first element requests a loan.
         let count = unsafe {
             let most = BATCH as u32;
             dds_take_mask(reader, places.0, places.1, BATCH, most, DDS_ANY_STATE)
         };
         let taken = usize::try_from(count).unwrap_or(0).min(BATCH);
         for (sample, info) in found.iter().zip(&infos).take(taken) {
-            // SAFETY: so many were given.
+            // SAFETY: `count` elements are initialized.
             let state = unsafe { info.assume_init_ref() }.instance_state;
             each(sample.cast_const(), state == DDS_ALIVE_INSTANCE_STATE);
         }
         if taken == 0 {
             return;
         }
-        // SAFETY: gives back what was lent by the call above.
+        // SAFETY: returns the loan of the call above.
         let _ = unsafe { dds_return_loan(reader, found.as_mut_ptr(), count) };
     }
 }
 
-/// First thing in which two endpoints of one topic do not go together, in words for the operator.
+/// First incompatible policy or type of two endpoints on one topic.
 fn conflict(ours: &Description, other: &Other<'_>) -> Option<Cow<'static, str>> {
     if other.type_name.to_bytes() != ours.dds_type.as_bytes() {
         let theirs = other.type_name.to_string_lossy();
@@ -269,7 +272,7 @@ fn conflict(ours: &Description, other: &Other<'_>) -> Option<Cow<'static, str>> 
 
 /// # Safety
 ///
-/// Null, or a string that ends with 0 and lives for `'a`.
+/// Null, or a NUL-terminated string that is valid for `'a`.
 unsafe fn text<'a>(text: *const c_char) -> &'a CStr {
     match text.is_null() {
         true => c"",
@@ -282,7 +285,7 @@ type Listener = unsafe extern "C" fn(dds_entity_t, *mut c_void);
 
 /// # Safety
 ///
-/// `this` points to the [`Discovery`] that the listener was made with.
+/// `this` points to the [`Discovery`] that created the listener.
 unsafe extern "C" fn on_writers(reader: dds_entity_t, this: *mut c_void) {
     // SAFETY: see above.
     if let Some(discovery) = unsafe { this.cast::<Discovery>().as_ref() } {
@@ -292,7 +295,7 @@ unsafe extern "C" fn on_writers(reader: dds_entity_t, this: *mut c_void) {
 
 /// # Safety
 ///
-/// As of [`on_writers`].
+/// As for [`on_writers`].
 unsafe extern "C" fn on_readers(reader: dds_entity_t, this: *mut c_void) {
     // SAFETY: see above.
     if let Some(discovery) = unsafe { this.cast::<Discovery>().as_ref() } {

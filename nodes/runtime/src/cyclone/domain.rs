@@ -1,4 +1,4 @@
-//! Domains of the process: Cyclone has one of each number, with one configuration.
+//! Cyclone domains of the process, one per number, each with one configuration.
 
 use std::collections::BTreeMap;
 use std::ffi::CString;
@@ -20,12 +20,12 @@ struct Shared {
     _domain: Entity,
 }
 
-/// A share in a domain; the last one ends it.
+/// A reference to a domain; dropping the last one deletes it.
 #[derive(Debug)]
 pub(super) struct Domain(u16);
 
 impl Domain {
-    /// Takes part in the domain of the network. The settings of who comes first hold for all.
+    /// Opens or shares the domain of the network. The first caller's settings apply to all.
     pub(super) fn join(network: &Network) -> Result<Self, String> {
         log::take_over();
         let id = network.domain_id;
@@ -37,7 +37,7 @@ impl Domain {
         let uri = std::env::var("CYCLONEDDS_URI").ok();
         let config = CString::new(config(network, uri.as_deref()));
         let config = config.map_err(|_| "CYCLONEDDS_URI has a zero byte".to_owned())?;
-        // SAFETY: a string that ends with 0 and is read during the call.
+        // SAFETY: a NUL-terminated string, read during the call.
         let make = || unsafe { dds_create_domain(u32::from(id), config.as_ptr()) };
         let domain = explained(|| match network.localhost_only {
             true => to_loopback(make),
@@ -58,7 +58,7 @@ impl Domain {
 
 impl Drop for Domain {
     fn drop(&mut self) {
-        // Ended under the lock: Cyclone refuses a domain that another thread is still ending.
+        // Deleted under the lock: Cyclone refuses to create a domain while another thread deletes it.
         let mut domains = lock(&DOMAINS);
         let Some(shared) = domains.get_mut(&self.0) else {
             return;

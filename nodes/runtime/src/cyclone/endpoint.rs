@@ -1,4 +1,4 @@
-//! An endpoint of ours: its description, and its peers as Cyclone's listeners tell of them.
+//! A local endpoint: its description, and its peers as reported by Cyclone's listeners.
 
 use std::collections::BTreeMap;
 use std::ffi::c_void;
@@ -24,7 +24,7 @@ use crate::port::{EndpointId, PortEvent};
 use crate::qos::Qos;
 use crate::sync::lock;
 
-/// Peers that were there before the listener was, at most.
+/// Limit of peers that matched before the listener was set.
 const MAX_FIRST_PEERS: usize = 4096;
 
 /// Side of a topic.
@@ -34,7 +34,7 @@ pub(super) enum Side {
     Reader,
 }
 
-/// Description of an endpoint as it is announced.
+/// Announced description of an endpoint.
 #[derive(Clone, Debug)]
 pub(super) struct Description {
     pub side: Side,
@@ -43,17 +43,17 @@ pub(super) struct Description {
     pub qos: Qos,
 }
 
-/// A reader or writer of ours. Listeners point to it: it outlives the entity that they are of.
+/// A local reader or writer. Its listeners refer to it, so it outlives their entity.
 pub(super) struct Endpoint {
     id: EndpointId,
     pub description: Description,
     events: Sender<PortEvent>,
-    /// By the handles that Cyclone gives them.
+    /// Peers by their Cyclone instance handles.
     peers: Mutex<BTreeMap<dds_instance_handle_t, EndpointId>>,
     arrivals: Arrivals<Taken>,
-    /// Numbers of the samples that have come.
+    /// Sequence numbers of received samples.
     gaps: Mutex<Gaps>,
-    /// Samples that readers which have left had not acknowledged.
+    /// Samples left unacknowledged by readers that have left.
     unacknowledged: AtomicU64,
 }
 
@@ -68,7 +68,7 @@ const WRITERS: Describe = dds_get_matched_publication_data;
 type List = unsafe extern "C" fn(dds_entity_t, *mut dds_instance_handle_t, usize) -> i32;
 
 impl Endpoint {
-    /// Hears of the entity's peers, and of samples, from now on, and of the peers that are there.
+    /// Reports the peers and samples of the entity, including peers that are present already.
     pub(super) fn watch(
         entity: &Entity,
         description: Description,
@@ -100,17 +100,17 @@ impl Endpoint {
         self.id
     }
 
-    /// Samples that have come, of a reader.
+    /// Received samples of a reader.
     pub(super) fn arrivals(&self) -> &Arrivals<Taken> {
         &self.arrivals
     }
 
-    /// Samples that readers which have left had not acknowledged, of a writer.
+    /// Samples of a writer left unacknowledged by readers that have left.
     pub(super) fn unacknowledged(&self) -> u64 {
         self.unacknowledged.load(Relaxed)
     }
 
-    /// GUID of the writer of a sample; none if it has gone.
+    /// GUID of a sample's writer; `None` if the writer has left.
     pub(super) fn writer(
         &self,
         reader: dds_entity_t,
@@ -136,8 +136,8 @@ impl Endpoint {
 
     fn listen(self: &Arc<Self>, entity: &Entity) -> Result<(), String> {
         let this = Arc::as_ptr(self).cast_mut().cast::<c_void>();
-        // SAFETY: the listener is made, copied into the entity and deleted here; `self` outlives the
-        // entity, whose owner holds it.
+        // SAFETY: the listener is created, copied into the entity and deleted here; the owner of the entity
+        // holds `self`, which outlives it.
         let code = unsafe {
             let listener = dds_create_listener(ptr::null_mut());
             let _ = match self.description.side {
@@ -159,7 +159,7 @@ impl Endpoint {
 
     fn add_first(&self, entity: &Entity, list: List, describe: Describe) {
         let mut handles = [0; MAX_FIRST_PEERS];
-        // SAFETY: room for as many handles as it says.
+        // SAFETY: space for the stated number of handles.
         let found = unsafe { list(entity.handle(), handles.as_mut_ptr(), handles.len()) };
         let found = usize::try_from(found).unwrap_or(0);
         for handle in handles.iter().take(found) {
@@ -185,19 +185,19 @@ impl Endpoint {
             })
         };
         if let Some(event) = event {
-            // Nobody listens after the end.
+            // The receiver may be gone at shutdown.
             let _ = self.events.try_send(event);
         }
     }
 }
 
-/// GUID of a matched peer; none if it has gone.
+/// GUID of a matched peer; `None` if it has left.
 fn guid(
     entity: dds_entity_t,
     handle: dds_instance_handle_t,
     describe: Describe,
 ) -> Option<EndpointId> {
-    // SAFETY: handles; what is given is ours until we free it, once.
+    // SAFETY: handles; the returned data are owned and freed once.
     unsafe {
         let found = describe(entity, handle);
         let id = found.as_ref().map(|found| endpoint_id(found.key));
@@ -210,7 +210,7 @@ fn guid(
 
 /// # Safety
 ///
-/// `this` points to the [`Endpoint`] that the listener was made with.
+/// `this` points to the [`Endpoint`] that created the listener.
 unsafe extern "C" fn on_reader(
     writer: dds_entity_t,
     status: dds_publication_matched_status_t,
@@ -225,7 +225,7 @@ unsafe extern "C" fn on_reader(
 
 /// # Safety
 ///
-/// As of [`on_reader`].
+/// As for [`on_reader`].
 unsafe extern "C" fn on_writer(
     reader: dds_entity_t,
     status: dds_subscription_matched_status_t,
@@ -240,7 +240,7 @@ unsafe extern "C" fn on_writer(
 
 /// # Safety
 ///
-/// As of [`on_reader`].
+/// As for [`on_reader`].
 unsafe extern "C" fn on_reader_left(this: *mut c_void, unacknowledged: u64) {
     // SAFETY: see above.
     if let Some(endpoint) = unsafe { this.cast::<Endpoint>().as_ref() } {
@@ -250,7 +250,7 @@ unsafe extern "C" fn on_reader_left(this: *mut c_void, unacknowledged: u64) {
 
 /// # Safety
 ///
-/// As of [`on_reader`].
+/// As for [`on_reader`].
 unsafe extern "C" fn on_data(reader: dds_entity_t, this: *mut c_void) {
     // SAFETY: see above.
     if let Some(endpoint) = unsafe { this.cast::<Endpoint>().as_ref() } {

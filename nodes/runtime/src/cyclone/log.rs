@@ -1,4 +1,4 @@
-//! The log of Cyclone, passed on to ours, and the errors in it as reasons.
+//! Redirection of Cyclone's log to ours, and its errors as reasons of failed calls.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -16,26 +16,26 @@ use log::Level;
 use super::entity::Entity;
 use crate::sync::lock;
 
-/// After this a line is told again: Cyclone refuses a stranger once a second.
+/// Time before a line is repeated: Cyclone logs a rejected participant once a second.
 const AGAIN: Duration = Duration::from_secs(60);
 
-/// Different lines in that time, at most: strangers may name themselves anew each time.
+/// Limit of distinct lines in that time: an unauthenticated peer may change its name each time.
 const MAX_LINES: usize = 100;
 
 thread_local! {
-    /// Errors of the call that this thread is in, if they are wanted.
+    /// Errors of the current call on this thread, while they are collected.
     static REASONS: RefCell<Option<Vec<String>>> = const { RefCell::new(None) };
 }
 
-/// Takes over Cyclone's log of this process.
+/// Redirects Cyclone's log of this process.
 pub(super) fn take_over() {
     static ONCE: Once = Once::new();
-    // SAFETY: a function that lives as long as the process and needs no argument.
+    // SAFETY: a function with static lifetime and without an argument.
     ONCE.call_once(|| unsafe { dds_set_log_sink(Some(on_line), ptr::null_mut()) });
 }
 
-/// An entity made by a function of Cyclone. The error is its return code, with the errors that Cyclone
-/// logs meanwhile on this thread instead of in the log.
+/// Creates a Cyclone entity. The error is its return code with the errors that Cyclone reported on this
+/// thread during the call; those are not logged.
 pub(super) fn explained(make: impl FnOnce() -> dds_entity_t) -> Result<Entity, String> {
     REASONS.set(Some(Vec::new()));
     let made = Entity::new(make());
@@ -51,7 +51,7 @@ pub(super) fn explained(make: impl FnOnce() -> dds_entity_t) -> Result<Entity, S
 
 /// # Safety
 ///
-/// A line that lives during the call.
+/// The line is valid during the call.
 unsafe extern "C" fn on_line(_: *mut c_void, line: *const dds_log_data_t) {
     // SAFETY: see above; `message` has `size` bytes.
     let (text, priority) = unsafe {
@@ -78,7 +78,7 @@ unsafe extern "C" fn on_line(_: *mut c_void, line: *const dds_log_data_t) {
     }
 }
 
-/// Logs what was not logged in the last minute.
+/// Logs a line unless it was logged in the last minute.
 pub(super) fn tell(level: Level, text: &str) {
     if is_news(text, Instant::now()) {
         log::log!(level, "Cyclone DDS: {text}");

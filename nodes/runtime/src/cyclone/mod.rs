@@ -1,7 +1,7 @@
-//! The transport over Eclipse Cyclone DDS, whose C interface is the crate `lattice_cyclone_sys`. All unsafe
-//! Rust of the project is here and in `confine`.
+//! Transport over Eclipse Cyclone DDS; the crate `lattice_cyclone_sys` binds its C interface. Unsafe Rust is
+//! confined to this module and `confine`.
 //!
-//! Topics are of any type name, samples are serialised bytes.
+//! Topics may have any type name; samples are serialized bytes.
 
 mod config;
 mod discovery;
@@ -15,7 +15,7 @@ mod qos;
 mod reader;
 mod sample;
 mod security;
-mod strangers;
+mod unauthenticated_participants;
 mod writer;
 
 pub(crate) use participant::Cyclone;

@@ -1,9 +1,9 @@
-//! Names of topics and services in DDS, as all rmws mangle them.
+//! DDS names of ROS topics and services, mangled as in all rmw implementations.
 
 use super::endpoint::Side;
 use crate::remote::GraphRole;
 
-/// Role and full name of an endpoint in ROS; none of clients, replies and what is not of ROS.
+/// Role and full ROS name of an endpoint; `None` for clients, replies and topics outside ROS.
 pub(super) fn role(side: Side, dds_name: &str) -> Option<(GraphRole, &str)> {
     let (prefix, name) = dds_name.split_at_checked(2)?;
     if !name.starts_with('/') {
@@ -17,17 +17,17 @@ pub(super) fn role(side: Side, dds_name: &str) -> Option<(GraphRole, &str)> {
     }
 }
 
-/// The DDS topic of a ROS topic: `/points` is `rt/points`.
+/// DDS topic of a ROS topic: `/points` is `rt/points`.
 pub(super) fn topic(full_name: &str) -> String {
     format!("rt{full_name}")
 }
 
-/// The DDS topic of a service's requests: `/reset` is `rq/resetRequest`.
+/// DDS topic of a service's requests: `/reset` is `rq/resetRequest`.
 pub(super) fn request(full_name: &str) -> String {
     format!("rq{full_name}Request")
 }
 
-/// The DDS topic of a service's replies: `/reset` is `rr/resetReply`.
+/// DDS topic of a service's replies: `/reset` is `rr/resetReply`.
 pub(super) fn reply(full_name: &str) -> String {
     format!("rr{full_name}Reply")
 }

@@ -1,4 +1,4 @@
-//! The participant of the process, and the endpoints made in it.
+//! The DDS participant of the process and its endpoints.
 
 use std::ffi::CString;
 use std::ptr;
@@ -31,26 +31,26 @@ use crate::qos::Qos;
 use crate::remote::is_type_hash;
 use crate::security::{Enclave, SecurityError};
 
-/// Longest message of `ros_discovery_info` that is taken.
+/// Longest accepted message of `ros_discovery_info`, bytes.
 const MAX_GRAPH_BYTES: usize = 1 << 20;
 
-/// Messages of so many participants on `ros_discovery_info` wait for a late joiner.
+/// QoS of the `ros_discovery_info` reader: keeps the messages of up to 100 participants.
 const GRAPH_READER: Qos = Qos::latched(100);
-/// The last message of a participant holds all its nodes.
+/// QoS of the `ros_discovery_info` writer: the last message lists all nodes.
 const GRAPH_WRITER: Qos = Qos::latched(1);
 
-/// Topic in DDS of an endpoint.
+/// DDS topic of an endpoint.
 #[derive(Clone, Copy)]
 struct DdsTopic<'a> {
-    /// Topic or service in ROS, for messages.
+    /// ROS topic or service, for messages.
     name: &'a str,
     dds_name: &'a str,
     ros_type: &'a str,
-    /// Hash of the type where it may be another than that of our message of this name.
+    /// Type hash, if it may differ from the hash of our message with this name.
     type_hash: Option<&'a str>,
 }
 
-/// Its name is not mangled.
+/// Topic with an unmangled name.
 const GRAPH: DdsTopic<'static> = DdsTopic {
     name: GRAPH_TOPIC,
     dds_name: GRAPH_TOPIC,
@@ -58,9 +58,9 @@ const GRAPH: DdsTopic<'static> = DdsTopic {
     type_hash: None,
 };
 
-/// The Cyclone participant of a process.
+/// Cyclone participant of the process.
 pub(crate) struct Cyclone {
-    // In this order: Cyclone's entities end from the inside out.
+    // Field order is drop order: inner entities first.
     discovery: Arc<Discovery>,
     participant: Entity,
     _domain: Domain,
@@ -91,7 +91,7 @@ impl Cyclone {
         let properties = enclave.secrets.as_ref().map(properties).transpose()?;
         let user_data = format!("enclave={};", enclave.name);
         let qos = NativeQos::of_participant(&user_data, &properties.unwrap_or_default());
-        // SAFETY: a number, and a QoS that is alive and copied; no listener.
+        // SAFETY: a number, and a live QoS that is copied; no listener.
         let make = || unsafe { dds_create_participant(domain.id(), qos.as_ptr(), ptr::null()) };
         let participant = explained(make)?;
         let (sender, events) = unbounded();
@@ -109,11 +109,11 @@ impl Cyclone {
         let text = |text: &str| CString::new(text).map_err(|_| "a name has a zero byte".to_owned());
         let (name, dds_type) = (text(name)?, text(dds_type)?);
         let parent = self.participant.handle();
-        // SAFETY: a handle, and strings that end with 0 and are copied.
+        // SAFETY: a handle, and NUL-terminated strings that are copied.
         explained(|| unsafe { lattice_topic(parent, name.as_ptr(), dds_type.as_ptr()) })
     }
 
-    /// Topic, QoS and description of an endpoint to be made.
+    /// Creates topic, QoS and description of an endpoint.
     fn prepare(
         &self,
         of: DdsTopic<'_>,
@@ -174,7 +174,7 @@ fn topic<'a>(of: PortTopic<'a>, dds_name: &'a str) -> DdsTopic<'a> {
     }
 }
 
-/// Topic of the requests or replies of a service.
+/// DDS topic of a service's requests or replies.
 fn part<'a>(of: PortService<'a>, dds_name: &'a str, ros_type: &'a str) -> DdsTopic<'a> {
     DdsTopic {
         name: of.name,
@@ -184,7 +184,7 @@ fn part<'a>(of: PortService<'a>, dds_name: &'a str, ros_type: &'a str) -> DdsTop
     }
 }
 
-/// USER_DATA of an endpoint, as rmw_dds_common reads it; nothing where the type's hash is unknown.
+/// USER_DATA of an endpoint in the format of rmw_dds_common; empty if the type hash is unknown.
 fn user_data(of: DdsTopic<'_>) -> String {
     let hash = of.type_hash.filter(|text| is_type_hash(text));
     let hash = hash.or_else(|| hash_of(of.ros_type));
@@ -248,8 +248,8 @@ impl Transport for Cyclone {
         self.events.clone().boxed()
     }
 
-    fn strangers(&self) -> usize {
-        self.discovery.strangers()
+    fn unauthenticated_participants(&self) -> usize {
+        self.discovery.unauthenticated_participants()
     }
 }
 

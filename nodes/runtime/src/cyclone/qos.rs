@@ -1,4 +1,4 @@
-//! Qualities of service in Cyclone's form.
+//! QoS policies as Cyclone objects.
 
 use std::ffi::CString;
 use std::ptr;
@@ -14,11 +14,11 @@ use lattice_cyclone_sys::{
 
 use crate::qos::{Durability, Qos, Reliability};
 
-/// Longest time that a writer of Cyclone blocks for a full send window, ns: [`super::writer`] waits for it
-/// without holding up the publisher thread.
+/// `max_blocking_time` of a Cyclone writer, ns. [`super::writer`] waits for a full send window instead, without
+/// blocking the publisher thread.
 const MAX_BLOCKING_NS: i64 = 0;
 
-/// "As much as it takes", for limits of resources.
+/// `DDS_LENGTH_UNLIMITED` of the resource limits.
 const UNLIMITED: i32 = -1;
 
 /// A QoS object of Cyclone.
@@ -30,18 +30,18 @@ impl NativeQos {
         Self(unsafe { dds_create_qos() })
     }
 
-    /// Of a participant with its USER_DATA and properties, such as those of security.
+    /// QoS of a participant with its USER_DATA and properties, such as those of DDS Security.
     pub(super) fn of_participant(user_data: &str, properties: &[(CString, CString)]) -> Self {
         let qos = Self::new();
         qos.set_user_data(user_data);
         for (name, value) in properties {
-            // SAFETY: `qos` is alive; both strings end with 0 and are copied.
+            // SAFETY: `qos` is alive; both strings are NUL-terminated and copied.
             unsafe { dds_qset_prop(qos.0, name.as_ptr(), value.as_ptr()) };
         }
         qos
     }
 
-    /// Of a reader or writer with its USER_DATA. Nothing is delivered inside the participant.
+    /// QoS of a reader or writer with its USER_DATA. Samples are not delivered within the participant.
     pub(super) fn of_endpoint(qos: &Qos, user_data: &str) -> Self {
         let count = |samples: usize| i32::try_from(samples).unwrap_or(i32::MAX).max(1);
         let (depth, kept) = (count(qos.depth), count(qos.kept()));
@@ -61,7 +61,7 @@ impl NativeQos {
             dds_qset_history(native.0, keep_last, depth);
             dds_qset_reliability(native.0, reliability, MAX_BLOCKING_NS);
             dds_qset_durability(native.0, durability);
-            // The history for late joiners is another one, of one sample if nothing is said.
+            // The durability service has its own history, of one sample by default.
             let (samples, instances, each) = (UNLIMITED, UNLIMITED, UNLIMITED);
             dds_qset_durability_service(native.0, 0, keep_last, kept, samples, instances, each);
             dds_qset_writer_data_lifecycle(native.0, false);
@@ -71,7 +71,7 @@ impl NativeQos {
     }
 
     fn set_user_data(&self, text: &str) {
-        // SAFETY: `self` is alive; so many bytes are copied.
+        // SAFETY: `self` is alive; `text.len()` bytes are copied.
         unsafe { dds_qset_userdata(self.0, text.as_ptr().cast(), text.len()) };
     }
 
@@ -82,7 +82,7 @@ impl NativeQos {
 
 impl Drop for NativeQos {
     fn drop(&mut self) {
-        // SAFETY: made by `dds_create_qos`, deleted once.
+        // SAFETY: created by `dds_create_qos`, deleted once.
         unsafe { dds_delete_qos(self.0) };
     }
 }
@@ -91,11 +91,11 @@ impl Drop for NativeQos {
 ///
 /// # Safety
 ///
-/// `qos` is null or a QoS of Cyclone's that lives during the call.
+/// `qos` is null or a Cyclone QoS that is valid during the call.
 pub(super) unsafe fn user_data(qos: *const dds_qos_t) -> Vec<u8> {
     let (mut copy, mut bytes) = (ptr::null_mut(), 0);
-    // SAFETY: the caller says that `qos` is alive; a copy is made of as many bytes as it says, which is ours
-    // to free, once.
+    // SAFETY: the caller guarantees that `qos` is alive; the returned copy of `size` bytes is owned and
+    // freed once.
     unsafe {
         if qos.is_null() || !dds_qget_userdata(qos, &mut copy, &mut bytes) || copy.is_null() {
             return Vec::new();
@@ -106,17 +106,17 @@ pub(super) unsafe fn user_data(qos: *const dds_qos_t) -> Vec<u8> {
     }
 }
 
-/// Reliability and durability of a peer; none where it does not say.
+/// Announced reliability and durability of a peer; `None` if not announced.
 ///
 /// # Safety
 ///
-/// `qos` is null or a QoS of Cyclone's that lives during the call.
+/// `qos` is null or a Cyclone QoS that is valid during the call.
 pub(super) unsafe fn announced(qos: *const dds_qos_t) -> Option<(Reliability, Durability)> {
     if qos.is_null() {
         return None;
     }
     let (mut reliability, mut blocking_ns, mut durability) = (0, 0, 0);
-    // SAFETY: the caller says that `qos` is alive; the others are local.
+    // SAFETY: the caller guarantees that `qos` is alive; the others are local.
     let known = unsafe {
         dds_qget_reliability(qos, &mut reliability, &mut blocking_ns)
             && dds_qget_durability(qos, &mut durability)

@@ -1,4 +1,4 @@
-//! One reader of Cyclone: the next sample as CDR bytes, awaited without polling.
+//! A Cyclone reader: awaits the next sample as CDR bytes, without polling.
 
 use std::ptr;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -15,9 +15,9 @@ use super::sample::Taken;
 use crate::port::{EndpointId, Origin, PortEvent, ReaderLosses, SampleId, SampleReader};
 use crate::sync::lock;
 
-/// Takes samples of one topic.
+/// Reader of one topic.
 pub(super) struct CycloneReader {
-    // In this order: the topic outlives the reader, what listeners use outlives both.
+    // Field order is drop order: the topic and the listener's data outlive the reader.
     reader: Entity,
     _topic: Entity,
     endpoint: Arc<Endpoint>,
@@ -26,7 +26,7 @@ pub(super) struct CycloneReader {
 }
 
 impl CycloneReader {
-    /// Samples longer than `max_bytes`, header included, are refused.
+    /// Creates a reader. Samples longer than `max_bytes`, header included, are rejected.
     pub(super) fn new(
         participant: &Entity,
         topic: Entity,
@@ -36,7 +36,7 @@ impl CycloneReader {
         events: Sender<PortEvent>,
     ) -> Result<Self, String> {
         let (parent, of) = (participant.handle(), topic.handle());
-        // SAFETY: handles, and a QoS that is alive and copied; no listener.
+        // SAFETY: handles, and a live QoS that is copied; no listener.
         let make = || unsafe { dds_create_reader(parent, of, qos.as_ptr(), ptr::null()) };
         let reader = explained(make)?;
         Ok(Self {
@@ -56,7 +56,7 @@ impl CycloneReader {
         let (bytes, max) = (taken.bytes(), self.max_bytes);
         if bytes.len() > max {
             let bytes = bytes.len();
-            let words = format!("{bytes} bytes are more than max_message_bytes = {max}");
+            let words = format!("{bytes} bytes exceed max_message_bytes = {max}");
             return Err(words);
         }
         let mut buffer = lock(&self.buffer);
@@ -88,7 +88,7 @@ impl SampleReader for CycloneReader {
     }
 
     fn is_known_to(&self, writer: &EndpointId) -> bool {
-        // SAFETY: a handle, and 16 bytes that are read during the call.
+        // SAFETY: a handle, and 16 bytes read during the call.
         unsafe { lattice_is_known_to(self.reader.handle(), writer.0.as_ptr()) }
     }
 

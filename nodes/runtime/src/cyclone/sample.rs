@@ -1,4 +1,4 @@
-//! Samples as Cyclone holds them.
+//! Samples in Cyclone's memory.
 
 use std::mem::MaybeUninit;
 use std::slice;
@@ -11,30 +11,30 @@ use lattice_cyclone_sys::{
 use super::entity::check;
 use crate::port::{EndpointId, SampleId};
 
-/// A sample that was taken out of a reader.
+/// A sample taken from a reader.
 pub(super) struct Taken(lattice_sample);
 
-// SAFETY: Cyclone counts references atomically and never changes a sample that is made.
+// SAFETY: Cyclone counts references atomically; a sample is immutable.
 unsafe impl Send for Taken {}
 
 impl Taken {
     /// Its bytes, encapsulation header first.
     pub(super) fn bytes(&self) -> &[u8] {
-        // SAFETY: `self` holds a reference to the sample, which has so many bytes there.
+        // SAFETY: `self` owns a reference to the sample, which has `length` bytes.
         unsafe { slice::from_raw_parts(self.0.bytes, self.0.length) }
     }
 
-    /// Handle of its writer.
+    /// Instance handle of its writer.
     pub(super) fn writer(&self) -> dds_instance_handle_t {
         self.0.writer
     }
 
-    /// The number that its writer gave it; 0 where that is not known.
+    /// Sequence number given by its writer; 0 if unknown.
     pub(super) fn number(&self) -> i64 {
         self.0.number
     }
 
-    /// The request that it answers, where the sender said so.
+    /// Identity of the request it replies to, if present.
     pub(super) fn related(&self) -> Option<SampleId> {
         let lattice_identity { guid, number } = self.0.related;
         let writer = EndpointId(guid);
@@ -44,21 +44,21 @@ impl Taken {
 
 impl Drop for Taken {
     fn drop(&mut self) {
-        // SAFETY: gives back the reference that `self` holds, once.
+        // SAFETY: releases the reference of `self` once.
         unsafe { lattice_release(self.0.blob) };
     }
 }
 
-/// The next sample of a reader.
+/// Takes the next sample of a reader.
 pub(super) fn take(reader: dds_entity_t) -> Option<Taken> {
     let mut sample = MaybeUninit::uninit();
-    // SAFETY: room for one sample.
+    // SAFETY: space for one sample.
     match check(unsafe { lattice_take(reader, sample.as_mut_ptr()) }) {
         Ok(0) => None,
-        // SAFETY: one was taken, and the reference is ours.
+        // SAFETY: one sample was taken with an owned reference.
         Ok(_) => Some(Taken(unsafe { sample.assume_init() })),
         Err(words) => {
-            // Only a reader that is gone fails; there will be no more samples.
+            // Only a deleted reader fails; no more samples follow.
             log::debug!("Cyclone DDS: {words}");
             None
         }

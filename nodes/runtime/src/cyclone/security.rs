@@ -1,11 +1,11 @@
-//! Security of a participant: the properties by which Cyclone's plugins find their files.
+//! DDS Security of a participant: properties with the files of Cyclone's plugins.
 
 use std::ffi::CString;
 use std::os::unix::ffi::OsStrExt;
 
 use crate::security::Secrets;
 
-/// Plugins, which are linked in; Cyclone finds them by these names.
+/// Statically linked plugins, by the names under which Cyclone looks them up.
 const PLUGINS: [(&str, &str); 9] = [
     ("dds.sec.auth.library.path", "dds_security_auth"),
     ("dds.sec.auth.library.init", "init_authentication"),
@@ -18,7 +18,7 @@ const PLUGINS: [(&str, &str); 9] = [
     ("dds.sec.crypto.library.finalize", "finalize_crypto"),
 ];
 
-/// Properties for the files of [`Secrets::files`].
+/// Property names of [`Secrets::files`], in the same order.
 const FILES: [&str; 6] = [
     "dds.sec.auth.identity_ca",
     "dds.sec.auth.identity_certificate",
@@ -29,7 +29,7 @@ const FILES: [&str; 6] = [
 ];
 const REVOKED: &str = "org.eclipse.cyclonedds.sec.auth.crl";
 
-/// Properties of a participant with these files.
+/// Security properties of a participant.
 pub(super) fn properties(secrets: &Secrets) -> Result<Vec<(CString, CString)>, String> {
     let property = |name: &str, value: &[u8]| match (CString::new(name), CString::new(value)) {
         (Ok(name), Ok(value)) => Ok((name, value)),

@@ -1,4 +1,4 @@
-//! One writer of Cyclone.
+//! A Cyclone writer.
 
 use std::ptr;
 use std::sync::Arc;
@@ -19,12 +19,12 @@ use crate::port::{
     Bytes, EndpointId, PortEvent, SampleId, SampleWriter, UNACKNOWLEDGED_BYTES, WriteRefusal,
 };
 
-/// Time between two looks at a full send window, unless all readers acknowledge before.
+/// Period of checks of a full send window, unless all readers acknowledge earlier.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// Writes samples of one topic.
+/// Writer of one topic.
 pub(super) struct CycloneWriter {
-    // In this order: the topic outlives the writer, what listeners use outlives both.
+    // Field order is drop order: the topic and the listener's data outlive the writer.
     writer: Entity,
     _topic: Entity,
     endpoint: Arc<Endpoint>,
@@ -40,7 +40,7 @@ impl CycloneWriter {
         events: Sender<PortEvent>,
     ) -> Result<Self, String> {
         let (parent, of) = (participant.handle(), topic.handle());
-        // SAFETY: handles, and a QoS that is alive and copied.
+        // SAFETY: handles, and a live QoS that is copied.
         let make = || unsafe { lattice_writer(parent, of, qos.as_ptr(), keeps) };
         let writer = explained(make)?;
         Ok(Self {
@@ -66,7 +66,7 @@ impl CycloneWriter {
             number,
         });
         let identity = identity.as_ref().map_or(ptr::null(), ptr::from_ref);
-        // SAFETY: so many bytes, and an identity or null, are read during the call.
+        // SAFETY: `body.len()` bytes, and an identity or null, are read during the call.
         let code = unsafe {
             let (bytes, count) = (body.as_ptr(), body.len());
             lattice_write(writer, bytes, count, identity)
@@ -109,7 +109,7 @@ impl SampleWriter for CycloneWriter {
     }
 }
 
-/// Waits until all readers have acknowledged. False: not in time, or the writer is gone.
+/// Waits until all readers have acknowledged. False: timeout, or the writer is deleted.
 fn wait_for_acks(writer: dds_entity_t, patience: Duration) -> bool {
     let patience_ns = i64::try_from(patience.as_nanos()).unwrap_or(i64::MAX);
     // SAFETY: a handle and a number.

@@ -1,4 +1,4 @@
-//! State machine of a managed node, with the numbers and names of `rcl_lifecycle` in ROS 2 Jazzy.
+//! Lifecycle state machine with the ids and labels of `rcl_lifecycle` in ROS 2 Jazzy.
 
 use lattice_msgs::lifecycle_msgs::{State, Transition, TransitionDescription};
 
@@ -13,7 +13,7 @@ const ACTIVATING: u8 = State::TRANSITION_STATE_ACTIVATING;
 const DEACTIVATING: u8 = State::TRANSITION_STATE_DEACTIVATING;
 const PROCESSING_ERROR: u8 = State::TRANSITION_STATE_ERRORPROCESSING;
 
-/// Every state, in the order in which ROS lists them.
+/// States in the order of ROS.
 const STATES: [(u8, &str); 11] = [
     (State::PRIMARY_STATE_UNKNOWN, "unknown"),
     (UNCONFIGURED, "unconfigured"),
@@ -32,7 +32,7 @@ const SUCCESS: &str = "transition_success";
 const FAILURE: &str = "transition_failure";
 const ERROR: &str = "transition_error";
 
-/// A transition: number, name, state before and state after.
+/// A transition: id, label, source state and target state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Edge {
     id: u8,
@@ -50,7 +50,7 @@ const fn edge(id: u8, label: &'static str, start: u8, goal: u8) -> Edge {
     }
 }
 
-/// Every transition, in the order in which ROS lists them.
+/// Transitions in the order of ROS.
 const EDGES: [Edge; 25] = [
     edge(1, "configure", UNCONFIGURED, CONFIGURING),
     edge(10, SUCCESS, CONFIGURING, INACTIVE),
@@ -79,23 +79,23 @@ const EDGES: [Edge; 25] = [
     edge(62, ERROR, PROCESSING_ERROR, FINALIZED),
 ];
 
-/// Work that a transition asks of the node.
+/// Transition callback of a managed node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Take up resources: endpoints, threads, memory.
+    /// Acquire resources: endpoints, threads, memory.
     Configure,
-    /// Give them back.
+    /// Release resources.
     Cleanup,
-    /// Begin to hear and to publish.
+    /// Start to receive and publish.
     Activate,
-    /// Cease to.
+    /// Stop to receive and publish.
     Deactivate,
-    /// Give back what is held, for good.
+    /// Release all resources finally.
     Shutdown,
 }
 
 impl Edge {
-    /// The work of this transition; none of those that end a transition.
+    /// Callback of this transition; `None` for a transition that ends another.
     pub(super) fn step(self) -> Option<Step> {
         match self.goal {
             CONFIGURING => Some(Step::Configure),
@@ -107,7 +107,7 @@ impl Edge {
         }
     }
 
-    /// As a message.
+    /// Transition message.
     pub(super) fn message(self) -> TransitionDescription {
         TransitionDescription {
             transition: Transition {
@@ -128,7 +128,7 @@ fn state_message(id: u8) -> State {
     }
 }
 
-/// State of a managed node.
+/// Lifecycle state of a node.
 #[derive(Debug)]
 pub(super) struct Machine(u8);
 
@@ -137,25 +137,25 @@ impl Machine {
         Self(UNCONFIGURED)
     }
 
-    /// The state, as a message.
+    /// Current state as a message.
     pub(super) fn state(&self) -> State {
         state_message(self.0)
     }
 
-    /// Transitions from the state.
+    /// Transitions available in the current state.
     pub(super) fn available(&self) -> impl Iterator<Item = Edge> {
         let state = self.0;
         EDGES.into_iter().filter(move |edge| edge.start == state)
     }
 
-    /// Begins the transition that is asked for, by its name where one is given, else by its number.
-    /// None: there is no such transition from the state.
+    /// Begins the requested transition, selected by its label if given, else by its id.
+    /// `None`: the current state has no such transition.
     pub(super) fn begin(&mut self, wanted: &Transition) -> Option<Edge> {
         let is_wanted = |edge: &Edge| match wanted.label.as_str() {
             "" => edge.id == wanted.id,
             label => edge.label == label,
         };
-        // Nobody else ends a transition that is under way.
+        // Requests cannot end a transition in progress.
         let found = self
             .available()
             .find(|edge| is_wanted(edge) && edge.step().is_some())?;
@@ -163,7 +163,7 @@ impl Machine {
         Some(found)
     }
 
-    /// Ends the transition that is under way.
+    /// Ends the transition in progress.
     pub(super) fn end(&mut self, succeeded: bool) -> Option<Edge> {
         let label = if succeeded { SUCCESS } else { FAILURE };
         let found = self.available().find(|edge| edge.label == label)?;
@@ -172,12 +172,12 @@ impl Machine {
     }
 }
 
-/// Every state, as messages.
+/// All states, as messages.
 pub(super) fn states() -> Vec<State> {
     STATES.iter().map(|(id, _)| state_message(*id)).collect()
 }
 
-/// Every transition, as messages.
+/// All transitions, as messages.
 pub(super) fn graph() -> Vec<TransitionDescription> {
     EDGES.iter().map(|edge| edge.message()).collect()
 }

@@ -1,4 +1,4 @@
-//! Managed nodes: services and events as `rclcpp_lifecycle` has them.
+//! Managed nodes: the services and the event topic of `rclcpp_lifecycle`.
 
 mod machine;
 
@@ -25,15 +25,15 @@ use crate::shutdown::Shutdown;
 use crate::sync::lock;
 use machine::{Edge, Machine};
 
-/// A request to change the state of one of the managed nodes of a process.
+/// Request to change the state of a managed node.
 pub struct ChangeRequest {
-    /// Index of the node, as it was given to [`Lifecycle::serve`].
+    /// Index of the node, as given to [`Lifecycle::serve`].
     pub node: usize,
     request: ChangeStateRequest,
     reply: Reply<ChangeStateResponse>,
 }
 
-/// Requests to the managed nodes of a process. Each node has one under way at a time.
+/// Queue of requests to the managed nodes of a process, one per node at a time.
 pub struct ChangeRequests {
     sender: Sender<ChangeRequest>,
     waiting: Receiver<ChangeRequest>,
@@ -47,7 +47,7 @@ impl Default for ChangeRequests {
 }
 
 impl ChangeRequests {
-    /// Blocks until the next one; none once the end is asked for.
+    /// Blocks until the next request; `None` after a shutdown request.
     pub fn next(&self, shutdown: &Shutdown) -> Option<ChangeRequest> {
         let ended = async {
             shutdown.requested().await;
@@ -56,7 +56,7 @@ impl ChangeRequests {
         block_on(or(ended, async { self.waiting.recv().await.ok() }))
     }
 
-    /// Refuses those that wait, and all that come.
+    /// Rejects pending and further requests.
     pub fn end(&self) {
         self.waiting.close();
         while let Ok(change) = self.waiting.try_recv() {
@@ -65,7 +65,7 @@ impl ChangeRequests {
     }
 }
 
-/// A managed node: it begins unconfigured, and others take it from state to state.
+/// A managed node. It begins in the state unconfigured.
 pub struct Lifecycle {
     node: Node,
     machine: Arc<Mutex<Machine>>,
@@ -74,8 +74,8 @@ pub struct Lifecycle {
 }
 
 impl Lifecycle {
-    /// Serves the five services of the node, which is silent and deaf until it is activated; requests to
-    /// change its state go to `requests` under the number `index`.
+    /// Serves the five lifecycle services of a node, which is inactive until it is activated. Change requests go
+    /// to `requests` with `index`.
     pub fn serve(
         node: &Node,
         index: usize,
@@ -90,7 +90,7 @@ impl Lifecycle {
         node.gate().set(false);
         let sender = requests.sender.clone();
         let change = move |request, reply| {
-            // The other end lives as long as the process hears requests.
+            // The receiver lives as long as the process serves requests.
             let _ = sender.try_send(ChangeRequest {
                 node: index,
                 request,
@@ -129,7 +129,7 @@ impl Lifecycle {
         })
     }
 
-    /// Does what a request asks: `work` takes the step, and says what failed.
+    /// Executes a change request: `work` runs the transition callback and returns its error.
     pub fn change(&self, change: ChangeRequest, work: impl FnOnce(Step) -> Result<(), String>) {
         let wanted = &change.request.transition;
         let begun = lock(&self.machine).begin(wanted);
@@ -137,7 +137,7 @@ impl Lifecycle {
         let (Some(edge), Some(step)) = (begun, begun.and_then(Edge::step)) else {
             let state = lock(&self.machine).state().label;
             let (id, label) = (wanted.id, shown(&wanted.label));
-            log::error!("{name}: no transition {id} {label:?} from the state {state}");
+            log::error!("{name}: no transition {id} {label:?} in state {state}");
             change.reply.send(ChangeStateResponse { success: false });
             return;
         };
@@ -173,7 +173,7 @@ impl Lifecycle {
             goal_state: edge.goal_state,
         };
         if let Err(error) = self.events.publish(event) {
-            log::debug!("transition not told of: {error}");
+            log::debug!("transition event not published: {error}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The log file, named and placed as by rcl_logging_spdlog.
+//! Log file, named and located as by rcl_logging_spdlog.
 
 use std::env;
 use std::fs::{self, File};
@@ -10,14 +10,14 @@ use std::sync::Mutex;
 use super::now_ns;
 use crate::sync::lock;
 
-/// Longest file; what comes later is not written.
+/// Largest file; later lines are not written.
 const MAX_BYTES: usize = 256 << 20;
 
-/// A file that grows by a line at a time.
+/// Log file, appended line by line.
 pub(super) struct LogFile(Mutex<(File, usize)>);
 
 impl LogFile {
-    /// Makes `<name>_<pid>_<ms>.log` in `ROS_LOG_DIR`, else in `ROS_HOME/log`, else in `~/.ros/log`.
+    /// Creates `<name>_<pid>_<ms>.log` in `ROS_LOG_DIR`, else in `ROS_HOME/log`, else in `~/.ros/log`.
     pub(super) fn open(
         name: Option<&str>,
         lookup: impl Fn(&str) -> Option<String>,
@@ -25,15 +25,16 @@ impl LogFile {
         let program = env::args_os().next().unwrap_or_default();
         let program = Path::new(&program).file_name().unwrap_or_default();
         let name = name.map_or_else(|| program.to_string_lossy().into_owned(), str::to_owned);
-        let place = folder(lookup).ok_or("no log file: neither ROS_LOG_DIR nor HOME is set")?;
+        let place = folder(lookup).ok_or("no log file: set ROS_LOG_DIR or HOME")?;
         let name = format!("{name}_{}_{}.log", process::id(), now_ns() / 1_000_000);
         let path = place.join(name);
         let made = fs::create_dir_all(&place).and_then(|()| File::create_new(&path));
-        let file = made.map_err(|error| format!("no log file {}: {error}", path.display()))?;
+        let file = made
+            .map_err(|error| format!("cannot create the log file {}: {error}", path.display()))?;
         Ok(Self(Mutex::new((file, MAX_BYTES))))
     }
 
-    /// Adds a line.
+    /// Appends a line.
     pub(super) fn write(&self, line: &str) {
         let (file, left) = &mut *lock(&self.0);
         let line = format!("{line}\n");

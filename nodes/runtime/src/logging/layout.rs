@@ -1,10 +1,10 @@
-//! Form of a line, by `RCUTILS_CONSOLE_OUTPUT_FORMAT`.
+//! Line format, by `RCUTILS_CONSOLE_OUTPUT_FORMAT`.
 
 use log::Record;
 
-/// Form of rcutils.
+/// Default format of rcutils.
 const DEFAULT: &str = "[{severity}] [{time}] [{name}]: {message}";
-/// Longest form, as in rcutils.
+/// Longest format, as in rcutils.
 const MAX_BYTES: usize = 2048;
 
 /// Parts of a line, in order.
@@ -25,7 +25,7 @@ enum Part {
 }
 
 impl Layout {
-    /// The form that the environment names; a token that is not known stays as it is.
+    /// Format given in the environment; unknown tokens are kept as text.
     pub(super) fn new(lookup: &impl Fn(&str) -> Option<String>) -> Self {
         let wanted = lookup("RCUTILS_CONSOLE_OUTPUT_FORMAT");
         let wanted = wanted.filter(|text| !text.is_empty() && text.len() <= MAX_BYTES);
@@ -47,7 +47,7 @@ impl Layout {
         Self(parts)
     }
 
-    /// The line of a record, without its end.
+    /// Line of a record, without its newline.
     pub(super) fn line(&self, record: &Record<'_>, now_ns: u128, source: &str) -> String {
         let text = |part: &Part| match part {
             Part::Text(text) => text.clone(),

@@ -1,4 +1,4 @@
-//! Levels of loggers while the process runs.
+//! Logger levels changed at run time.
 
 use std::io::Write;
 use std::sync::{Arc, Mutex, OnceLock};
@@ -11,21 +11,21 @@ use super::plan::Plan;
 use super::{now_ns, source};
 use crate::sync::lock;
 
-/// Most loggers whose levels are set, and longest name of one.
+/// Limits of loggers with a level, and of the length of a name.
 const MAX_SET: usize = 256;
 const MAX_NAME_BYTES: usize = 255;
 
-/// Settings of the console, of which a logger is made anew when a level is set.
+/// Console settings; a changed level creates a new logger from them.
 pub(super) struct Console {
     plan: Plan,
     layout: Arc<Layout>,
     node_name: String,
 }
 
-/// The console of the process, and the logger that shows it now.
+/// Console settings of the process, and the active logger.
 static CONSOLE: OnceLock<(Mutex<Console>, Shown)> = OnceLock::new();
 
-/// The logger that shows the console now.
+/// The active logger.
 pub(super) type Shown = Arc<Mutex<Arc<Logger>>>;
 
 impl Console {
@@ -52,7 +52,7 @@ impl Console {
         builder.build()
     }
 
-    /// Sets a level by its number; 0 takes it back.
+    /// Sets a level by its number; 0 removes it.
     fn set(&mut self, logger: &str, level: u32) -> Result<(), String> {
         let filter = match level {
             0 => None,
@@ -60,14 +60,20 @@ impl Console {
             20 => Some(LevelFilter::Info),
             30 => Some(LevelFilter::Warn),
             40 | 50 => Some(LevelFilter::Error),
-            other => return Err(format!("{other} is no level: 0, 10, 20, 30, 40 or 50 are")),
+            other => {
+                return Err(format!(
+                    "level {other} is not one of 0, 10, 20, 30, 40 and 50"
+                ));
+            }
         };
         let set = &mut self.plan.set;
         let is_new = !set.contains_key(logger);
         match filter {
             None => drop(set.remove(logger)),
             Some(_) if logger.len() > MAX_NAME_BYTES || (is_new && set.len() >= MAX_SET) => {
-                return Err("too long a name, or too many loggers".to_owned());
+                return Err(format!(
+                    "a logger name exceeds {MAX_NAME_BYTES} bytes, or {MAX_SET} loggers have a level"
+                ));
             }
             Some(filter) => drop(set.insert(logger.to_owned(), (level, filter))),
         }
@@ -76,14 +82,14 @@ impl Console {
 }
 
 pub(super) fn install(console: Console, shown: Shown) {
-    // One logger a process: there is none yet.
+    // Set once: a process has one logger.
     let _ = CONSOLE.set((Mutex::new(console), shown));
 }
 
-/// Sets the level of a logger by its number in `rcl_interfaces/msg/LoggerLevel`; the empty name is the
-/// root, 0 takes back what was set.
+/// Sets the level of a logger by its number in `rcl_interfaces/msg/LoggerLevel`. The empty name is the
+/// root; level 0 removes the setting.
 pub(crate) fn set_level(logger: &str, level: u32) -> Result<(), String> {
-    let (console, shown) = CONSOLE.get().ok_or("the process has no log")?;
+    let (console, shown) = CONSOLE.get().ok_or("logging is not initialized")?;
     let mut console = lock(console);
     console.set(logger, level)?;
     let logger = console.build();
@@ -93,7 +99,7 @@ pub(crate) fn set_level(logger: &str, level: u32) -> Result<(), String> {
     Ok(())
 }
 
-/// Level that was set for a logger; 0: none was.
+/// Level set for a logger; 0: none.
 pub(crate) fn level(logger: &str) -> u32 {
     let console = CONSOLE.get().map(|(console, _)| lock(console));
     let set = console.and_then(|console| console.plan.set.get(logger).map(|(level, _)| *level));

@@ -1,4 +1,4 @@
-//! The log of the process in the form of rcutils: to the console, to a file, and to a tap for `/rosout`.
+//! Logging in the format of rcutils: to the console, to a file, and to a sink for `/rosout`.
 
 mod file;
 mod layout;
@@ -23,20 +23,20 @@ use std::{
     time::{SystemTime, UNIX_EPOCH},
 };
 
-/// Takes every record that passes the log level; the text is the name of the node it is from.
+/// Receives every record that passes the log level, with the name of its node.
 pub type Sink = Box<dyn Fn(&Record<'_>, &str) + Send + Sync>;
 
 static SINK: OnceLock<Sink> = OnceLock::new();
 
 thread_local! {
-    /// Set while the sink runs, so that what it logs does not come back to it.
+    /// Set while the sink runs, so that it does not receive its own records.
     static IN_SINK: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Starts logging for a process whose node is `node_name`.
+/// Initializes logging for a process whose node is `node_name`.
 ///
-/// `--log-level` decides what is shown, without it `RUST_LOG`, without both `info`. Prints the
-/// warnings of the command line. Fails if a logger is there already.
+/// The level is that of `--log-level`, else `RUST_LOG`, else `info`. Prints the warnings of the command
+/// line. Fails if a logger is installed already.
 pub fn init(args: &RosArgs, node_name: &str) -> Result<(), SetLoggerError> {
     let lookup = |name: &str| std::env::var(name).ok();
     let layout = Arc::new(Layout::new(&lookup));
@@ -69,13 +69,13 @@ pub fn init(args: &RosArgs, node_name: &str) -> Result<(), SetLoggerError> {
     Ok(())
 }
 
-/// Also gives the log to `sink`, for `/rosout`; false if there is one already.
+/// Adds `sink` as a second output, for `/rosout`; false if one is set already.
 pub fn tee(sink: Sink) -> bool {
     SINK.set(sink).is_ok()
 }
 
 struct Tee {
-    /// Replaced when a level is set.
+    /// Replaced when a level changes.
     console: Shown,
     to_console: bool,
     layout: Arc<Layout>,
@@ -124,7 +124,7 @@ fn now_ns() -> u128 {
     since.unwrap_or_default().as_nanos()
 }
 
-/// The node of a record: the process's, unless the record has a target that is no module path.
+/// Node of a record: the process's node, unless the target is not a module path.
 fn source<'a>(target: &'a str, node_name: &'a str) -> &'a str {
     const LIBRARIES: [&str; 3] = ["lattice_core", "lattice_msgs", "lattice_nodes"];
     if target.contains("::") || LIBRARIES.contains(&target) {

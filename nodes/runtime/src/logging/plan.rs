@@ -4,20 +4,20 @@ use std::collections::BTreeMap;
 use env_logger::{Builder, Target, WriteStyle};
 use log::LevelFilter;
 
-/// Our own crates; their targets begin with it.
+/// Prefix of the targets of our crates.
 const OURS: &str = "lattice_";
-/// Libraries whose chatter would hide ours: silent unless named by `--log-level` or `RUST_LOG`, and
-/// warnings only with `--log-level debug`.
+/// Verbose libraries: off unless named by `--log-level` or `RUST_LOG`; warnings only with
+/// `--log-level debug`.
 const CHATTY: [&str; 2] = ["polling", "async_io"];
 
-/// Settings of the console log, from the arguments and the environment.
+/// Console log settings, from the arguments and the environment.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Plan {
-    /// Target and level; the longest target that fits counts, and of equal ones the last.
+    /// Target and level. The longest matching target applies; of equal ones the last.
     pub filters: Vec<(Option<String>, LevelFilter)>,
-    /// `RUST_LOG`, where no `--log-level` is given.
+    /// `RUST_LOG`, if no `--log-level` is given.
     pub rust_log: Option<String>,
-    /// Levels set at run time, by the name of the logger; they count above all others.
+    /// Levels set at run time by logger name; they override all others.
     pub set: BTreeMap<String, (u32, LevelFilter)>,
     /// `RCUTILS_COLORIZED_OUTPUT`: 1 always, 0 never, else on a terminal.
     pub style: WriteStyle,
@@ -58,7 +58,7 @@ impl Plan {
         }
     }
 
-    /// Place of the console log.
+    /// Output of the console log.
     pub(super) fn target(&self) -> Target {
         match self.to_stdout {
             true => Target::Stdout,
@@ -93,7 +93,7 @@ fn targets(
         return all.collect();
     }
     let node = logger.rsplit(['.', '/']).next().unwrap_or(logger);
-    // The modules of one of several nodes of a process are named as the node.
+    // Modules of one node in a process of several use the node's name.
     let mut targets = vec![node.to_owned(), format!("{OURS}nodes::{node}")];
     if node == node_name {
         targets.push(OURS.to_owned());
@@ -102,7 +102,7 @@ fn targets(
     targets.map(|target| (Some(target), level)).collect()
 }
 
-/// Levels of libraries where ours is `level`.
+/// Library levels for our level `level`.
 fn libraries(level: LevelFilter) -> impl Iterator<Item = (Option<String>, LevelFilter)> {
     let chatty_level = match level {
         LevelFilter::Debug | LevelFilter::Trace => LevelFilter::Warn,

@@ -8,7 +8,7 @@ use std::{
 
 static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
-/// Gate for log lines: one message per period passes, the others are counted.
+/// Rate limit of a log line: one message per period passes, the others are counted.
 #[derive(Debug)]
 pub struct Throttle {
     period_ns: u64,
@@ -17,7 +17,7 @@ pub struct Throttle {
 }
 
 impl Throttle {
-    /// A throttle that lets its first message through.
+    /// A throttle whose first message passes.
     pub const fn new(period: Duration) -> Throttle {
         let period_ns = period.as_secs().saturating_mul(1_000_000_000);
         let period_ns = period_ns.saturating_add(period.subsec_nanos() as u64);
@@ -28,7 +28,7 @@ impl Throttle {
         }
     }
 
-    /// The number of messages suppressed since the last one if a message may pass now.
+    /// Number of messages suppressed since the last one, if a message may pass now.
     pub fn check(&self) -> Option<u64> {
         self.check_at(u64::try_from(START.elapsed().as_nanos()).unwrap_or(u64::MAX))
     }

@@ -1,4 +1,4 @@
-//! ROS names: expansion, remapping and validity as in rcl and rmw, and their names in DDS.
+//! ROS names: expansion, remapping and validation as in rcl and rmw.
 
 mod remap;
 mod shown;
@@ -8,12 +8,12 @@ pub(crate) use shown::shown;
 
 use thiserror::Error;
 
-/// rmw's limits of a full topic or service name, of a namespace and of a node's name, bytes.
+/// Limits of rmw: full topic or service name, namespace and node name, bytes.
 const TOPIC_LENGTH_MAX: usize = 247;
 const NAMESPACE_LENGTH_MAX: usize = 245;
 const NODE_NAME_LENGTH_MAX: usize = 255;
 
-/// Reason why a name is refused. Names are cut to a readable length.
+/// Reason for rejecting a name. Names are shortened for the message.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum NameError {
     #[error("the {what} {name:?} {problem}")]
@@ -23,11 +23,11 @@ pub enum NameError {
         problem: &'static str,
     },
     #[error(
-        "the topic {name:?} has the unknown substitution {{{key}}}; known are {{node}}, {{ns}} and {{namespace}}"
+        "the topic {name:?} has the unknown substitution {{{key}}}; use {{node}}, {{ns}} or {{namespace}}"
     )]
     UnknownSubstitution { name: String, key: String },
-    /// Longer than rmw allows, bytes.
-    #[error("the {what} {name:?} has {length} bytes, {length_max} are allowed")]
+    /// Length above rmw's limit, bytes.
+    #[error("the {what} {name:?} has {length} bytes, more than {length_max}")]
     TooLong {
         what: &'static str,
         name: String,
@@ -46,9 +46,9 @@ pub(crate) fn is_identifier(text: &str) -> bool {
     text.bytes().all(is_word) && !text.starts_with(|c: char| c.is_ascii_digit()) && !text.is_empty()
 }
 
-/// The full name of a topic or service of the node, after the first remap rule that matches.
+/// Full name of a topic or service of the node, after the first matching remap rule.
 ///
-/// Knows `/absolute`, `relative`, `~/private`, `{node}`, `{ns}` and `{namespace}`.
+/// Supports `/absolute`, `relative`, `~/private`, `{node}`, `{ns}` and `{namespace}`.
 pub(crate) fn resolve(
     kind: NameKind,
     name: &str,
@@ -70,7 +70,7 @@ pub(crate) fn resolve(
     Ok(full)
 }
 
-/// The full name of a topic before remapping; `//` and lengths are not checked yet.
+/// Full name of a topic before remapping; `//` and lengths are not checked yet.
 fn expand(name: &str, node_name: &str, namespace: &str) -> Result<String, NameError> {
     validate_node_name(node_name)?;
     validate_namespace(namespace)?;
@@ -98,12 +98,12 @@ fn expand(name: &str, node_name: &str, namespace: &str) -> Result<String, NameEr
     })
 }
 
-/// A node's full name, for example `/robot/mapper`.
+/// Full name of a node, for example `/robot/mapper`.
 pub(crate) fn fully_qualified(node_name: &str, namespace: &str) -> String {
     format!("{}/{node_name}", namespace.trim_end_matches('/'))
 }
 
-/// rmw's rules for a node's name.
+/// Validates a node name by the rules of rmw.
 pub(crate) fn validate_node_name(name: &str) -> Result<(), NameError> {
     let invalid = |problem| invalid("node name", name, problem);
     if name.is_empty() {
@@ -117,7 +117,7 @@ pub(crate) fn validate_node_name(name: &str) -> Result<(), NameError> {
     }
 }
 
-/// rmw's rules for a namespace: `/`, or a full name.
+/// Validates a namespace by the rules of rmw: `/`, or a full name.
 pub(crate) fn validate_namespace(namespace: &str) -> Result<(), NameError> {
     if namespace == "/" {
         return Ok(());
@@ -125,7 +125,7 @@ pub(crate) fn validate_namespace(namespace: &str) -> Result<(), NameError> {
     full("namespace", namespace, NAMESPACE_LENGTH_MAX)
 }
 
-/// rmw's rules for the full name of a topic or service.
+/// Validates a full topic or service name by the rules of rmw.
 pub(crate) fn validate_full_name(name: &str) -> Result<(), NameError> {
     full("topic", name, TOPIC_LENGTH_MAX)
 }
@@ -151,7 +151,7 @@ fn full(what: &'static str, name: &str, length_max: usize) -> Result<(), NameErr
     length(what, name, length_max)
 }
 
-/// rcl's rules for a name before expansion.
+/// Validates a name before expansion by the rules of rcl.
 fn validate_unexpanded(name: &str) -> Result<(), NameError> {
     let invalid = |problem| Err(invalid("topic", name, problem));
     if name.is_empty() {
@@ -215,7 +215,7 @@ fn invalid(what: &'static str, name: &str, problem: &'static str) -> NameError {
     }
 }
 
-/// Enough of a name to recognise it.
+/// Name, shortened for messages.
 fn cut(name: &str) -> String {
     name.chars().take(NODE_NAME_LENGTH_MAX).collect()
 }

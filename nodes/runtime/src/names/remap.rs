@@ -1,7 +1,7 @@
 use super::{is_token, shown, validate_namespace};
 use std::str::FromStr;
 
-/// Kind of names that a rule applies to: `rostopic://`, `rosservice://` or both.
+/// Names that a rule applies to: `rostopic://`, `rosservice://` or both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NameKind {
     Any,
@@ -9,7 +9,7 @@ pub(crate) enum NameKind {
     Service,
 }
 
-/// Replacement that a rule makes.
+/// Replacement by a rule.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum RemapTarget {
     /// `__node:=name`.
@@ -24,16 +24,16 @@ pub(crate) enum RemapTarget {
     },
 }
 
-/// One `-r` rule.
+/// One remap rule (`-r`).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct RemapRule {
-    /// The only node the rule is for, or all of them.
+    /// Node that the rule is restricted to; `None`: all nodes.
     pub node: Option<String>,
     pub target: RemapTarget,
 }
 
 impl RemapRule {
-    /// True if the rule is for the node of this name.
+    /// True if the rule applies to the node of this name.
     pub(crate) fn applies_to(&self, node_name: &str) -> bool {
         self.node.as_deref().is_none_or(|node| node == node_name)
     }
@@ -44,10 +44,10 @@ impl FromStr for RemapRule {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (node, rule) = split_node(text);
-        let (from, to) = rule.split_once(":=").ok_or("there is no `:=`")?;
+        let (from, to) = rule.split_once(":=").ok_or("`:=` is missing")?;
         let target = match from {
             "__node" | "__name" if is_token(to) => RemapTarget::NodeName(to.to_owned()),
-            "__node" | "__name" => return Err(format!("`{}` is no node name", shown(to))),
+            "__node" | "__name" => return Err(format!("`{}` is not a valid node name", shown(to))),
             "__ns" => {
                 validate_namespace(to).map_err(|error| error.to_string())?;
                 RemapTarget::Namespace(to.to_owned())
@@ -61,7 +61,7 @@ impl FromStr for RemapRule {
     }
 }
 
-/// Splits `node:rest`; `rostopic://` and `rosservice://` are no node prefixes.
+/// Splits `node:rest`; `rostopic://` and `rosservice://` are not node prefixes.
 pub(crate) fn split_node(text: &str) -> (Option<&str>, &str) {
     match text.split_once(':') {
         Some((node, rest))
@@ -102,8 +102,8 @@ fn check_name(name: &str) -> Result<(), String> {
     Err(match name {
         "" => "one side of `:=` is empty".to_owned(),
         _ if name.contains('*') => {
-            format!("`{shown}` has a wildcard, which ROS remap rules do not know")
+            format!("`{shown}` has a wildcard, which ROS remap rules do not support")
         }
-        _ => format!("`{shown}` is no name"),
+        _ => format!("`{shown}` is not a valid name"),
     })
 }

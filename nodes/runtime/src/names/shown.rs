@@ -1,7 +1,7 @@
-/// Longest part of an argument that a message repeats, characters.
+/// Longest quoted part of an argument in a message, characters.
 const SHOWN_MAX: usize = 160;
 
-/// `text` with control characters escaped, cut where it is too long for a message.
+/// Escapes control characters of `text` and shortens it for a message.
 pub(crate) fn shown(text: &str) -> String {
     let mut chars = text.chars();
     let mut out: String = chars

@@ -1,4 +1,4 @@
-//! Topics that a node is of no use without, named while they have no publisher.
+//! Required input topics, reported while they have no publisher.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, Weak};
@@ -13,14 +13,14 @@ use crate::subscription::{Intake, Subscription};
 use crate::sync::lock;
 use crate::timer::Timer;
 
-/// Wall time that a publisher has to appear.
+/// Time allowed for a publisher to appear, wall clock.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Between two looks at the publishers.
+/// Period of checks.
 const PERIOD: Duration = Duration::from_secs(1);
-/// Topics that are named in place of a missing one, at most.
+/// Limit of alternative topics named in a message.
 const MAX_NAMED: usize = 8;
 
-/// Subscriptions of a node that need a publisher.
+/// Subscriptions of a node that require a publisher.
 #[derive(Default)]
 pub(super) struct Expected(Mutex<State>);
 
@@ -37,16 +37,16 @@ struct Input {
     source: Source,
 }
 
-/// What the log has of a topic without a publisher.
+/// Warning already logged for a topic without a publisher.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Named {
     No,
     Alone,
-    /// With what is there in its place.
+    /// Logged with alternative topics.
     WithOthers,
 }
 
-/// Where the messages of a topic come from.
+/// Origin of a topic's messages.
 #[derive(Clone, Copy)]
 struct Source {
     from: &'static str,
@@ -55,11 +55,11 @@ struct Source {
 }
 
 impl Node {
-    /// Names each of these topics that has no publisher 3 s from now: once in the log, once more when others appear
-    /// that could take its place, and in the task `inputs` of `/diagnostics` as long as it has none.
+    /// Reports each of these topics that has no publisher 3 s from now: once in the log, again when alternative
+    /// topics appear, and in the task `inputs` of `/diagnostics` while it has none.
     ///
-    /// The line names topics of its type that could take its place, of those for which `is_like` holds. `from`
-    /// publishes the topic, `parameter` sets it.
+    /// The message names alternative topics of the same type for which `is_like` holds. `from` names the
+    /// publisher of the topic, `parameter` the parameter that sets it.
     pub fn expect_publishers<'a>(
         &self,
         subscriptions: impl IntoIterator<Item = &'a Subscription>,
@@ -94,7 +94,7 @@ impl Node {
     }
 }
 
-/// The look at the publishers, once a period.
+/// Periodic check of the publishers.
 struct Watch {
     expected: Arc<Expected>,
     shared: Weak<Shared>,
@@ -140,7 +140,7 @@ impl Watch {
     }
 }
 
-/// The line about a topic of a type without a publisher, and what it names.
+/// Message about a topic without a publisher, and the warning it counts as.
 fn line(
     (topic, type_name): (&str, &str),
     remotes: &[RemotePublisher],
@@ -159,7 +159,7 @@ fn line(
     let here = || remotes.iter().filter(|of| of.topic == topic);
     if here().any(|of| of.type_name == type_name) {
         let line = format!(
-            "{begin} matches: one is there with incompatible QoS; set qos.{topic}.reliability or \
+            "{begin} matches: a publisher has incompatible QoS; set qos.{topic}.reliability or \
              qos.{topic}.durability"
         );
         return (line, Named::WithOthers);
@@ -168,7 +168,7 @@ fn line(
         let is_valid = names::validate_full_name(&of.topic).is_ok();
         of.type_name == type_name && of.topic != topic && is_valid && is_like(&of.topic)
     });
-    // Those with the same last part first.
+    // Topics with the same last part first.
     let last = |name: &str| name.rsplit('/').next().unwrap_or_default().to_owned();
     let others: BTreeSet<(bool, &str)> = others
         .map(|of| (last(&of.topic) != last(topic), &*of.topic))
@@ -177,7 +177,7 @@ fn line(
     let set = set.unwrap_or_default();
     let remedy = match others.first() {
         None => format!(
-            "no topic is there that could take its place; start {from} with this ROS_DOMAIN_ID{}{set}",
+            "there is no alternative topic; start {from} with this ROS_DOMAIN_ID{}{set}",
             if set.is_empty() { "" } else { ", " }
         ),
         Some((_, first)) => {
@@ -270,8 +270,8 @@ mod tests {
         let there = remotes(&[("/points", "sensor_msgs/msg/LaserScan")]);
         assert_eq!(
             line(("/points", CLOUD), &there, "/", SOURCE).0,
-            "no publisher on /points (sensor_msgs/msg/PointCloud2) after 3 s; no topic is there that could \
-             take its place; start the driver with this ROS_DOMAIN_ID, or set points_topics; /points is \
+            "no publisher on /points (sensor_msgs/msg/PointCloud2) after 3 s; there is no alternative \
+             topic; start the driver with this ROS_DOMAIN_ID, or set points_topics; /points is \
              published as sensor_msgs/msg/LaserScan"
         );
     }

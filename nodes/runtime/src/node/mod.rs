@@ -1,4 +1,4 @@
-//! A logical node: name, parameters, remaps, and the endpoints made under them.
+//! A logical node: name, parameters, remap rules and endpoints.
 
 mod expected;
 mod services;
@@ -10,11 +10,11 @@ use lattice_msgs::RosMessage;
 use self::expected::Expected;
 use super::clock::Clock;
 use super::diagnostics::Diagnostics;
+use super::discovered_graph::GraphEndpoint;
 use super::error::RuntimeError;
-use super::gate::Gate;
 use super::graph::NodeId;
+use super::lifecycle_gate::LifecycleGate;
 use super::names::{self, NameKind};
-use super::neighbours::GraphEndpoint;
 use super::outbox::WhenFull;
 use super::params::Params;
 use super::publisher::{Publisher, RawPublisher};
@@ -22,12 +22,12 @@ use super::qos::{Durability, Qos};
 use super::remote::RemotePublisher;
 use super::ros_args::RosArgs;
 use super::shared::{DEFAULT_MAX_MESSAGE_BYTES, Shared};
-use super::subscription::{Load, Sample, Stats, Subscription, Undecoded};
+use super::subscription::{Sample, Stats, Subscription, SubscriptionExecutor, Undecoded};
 
-/// Least `max_message_bytes`: an Odometry takes 720 bytes, so that below it no pose would be taken.
+/// Smallest `max_message_bytes`: an Odometry has 720 bytes, so a smaller limit would reject poses.
 const MIN_MESSAGE_BYTES: usize = 1000;
 
-/// A node of the process. Clones are the same node.
+/// A node of the process. Clones refer to the same node.
 #[derive(Clone)]
 pub struct Node {
     inner: Arc<Inner>,
@@ -43,7 +43,7 @@ struct Inner {
     params: Arc<Params>,
     clock: Clock,
     max_message_bytes: usize,
-    gate: Arc<Gate>,
+    gate: Arc<LifecycleGate>,
     expected: Arc<Expected>,
 }
 
@@ -94,8 +94,8 @@ impl Node {
         self.inner.id
     }
 
-    /// The gate in front of its topics.
-    pub(crate) fn gate(&self) -> &Gate {
+    /// Lifecycle gate of its topics.
+    pub(crate) fn gate(&self) -> &LifecycleGate {
         &self.inner.gate
     }
 
@@ -130,12 +130,12 @@ impl Node {
         Ok(names::resolve(kind, name, node, namespace, remaps)?)
     }
 
-    /// The clock this node goes by.
+    /// Clock of the node.
     pub fn clock(&self) -> Clock {
         self.inner.clock.clone()
     }
 
-    /// States of this node's tasks, for `/diagnostics`.
+    /// Diagnostic tasks of the node, for `/diagnostics`.
     pub fn diagnostics(&self) -> Diagnostics {
         let shared = Arc::downgrade(&self.inner.shared);
         let losses = move || {
@@ -145,7 +145,7 @@ impl Node {
         Diagnostics::new(&self.inner.fqn, &self.inner.shared.tasks, Arc::new(losses))
     }
 
-    /// A publisher; the parameters `qos.<topic>.*` override the QoS.
+    /// Creates a publisher; the parameters `qos.<topic>.*` override the QoS.
     pub fn publisher<M: RosMessage>(
         &self,
         topic: &str,
@@ -154,8 +154,8 @@ impl Node {
         self.publisher_when_full(topic, qos, WhenFull::Drop)
     }
 
-    /// A publisher that drops nothing for a reliable subscriber which does not keep up: messages wait in its
-    /// queue. That is bounded, so publish only while [`Publisher::is_acknowledged`].
+    /// Creates a publisher that drops nothing for a slow reliable subscriber: messages wait in its
+    /// bounded queue, so publish only while [`Publisher::is_acknowledged`].
     pub fn lossless_publisher<M: RosMessage>(
         &self,
         topic: &str,
@@ -179,7 +179,7 @@ impl Node {
         Ok(publisher)
     }
 
-    /// The same with the QoS that it is to have.
+    /// Creates a publisher with exactly this QoS.
     pub(crate) fn publisher_as_is<M: RosMessage>(
         &self,
         topic: &str,
@@ -190,9 +190,9 @@ impl Node {
         shared.publisher(self.id(), &resolved, &qos, WhenFull::Drop)
     }
 
-    /// A publisher of CDR bytes of the type, such as `sensor_msgs/msg/Imu`, on a full topic name.
+    /// Creates a publisher of CDR bytes of a type such as `sensor_msgs/msg/Imu`, on a full topic name.
     ///
-    /// `type_hash` is announced, where it is one (`RIHS01_...`); else that of our message of this type.
+    /// Announces `type_hash` (`RIHS01_...`) if valid, else the hash of our message of this type.
     pub fn raw_publisher(
         &self,
         resolved_topic: &str,
@@ -206,62 +206,62 @@ impl Node {
             .raw_publisher(self.id(), resolved_topic, type_name, type_hash, &qos)
     }
 
-    /// Gives every message on a topic to `handler`; `qos.<topic>.*` override the QoS.
+    /// Subscribes to a topic; `qos.<topic>.*` override the QoS.
     ///
-    /// The handler runs on a thread of the runtime and must return at once: hand work over. It may
-    /// publish; it must not flush, nor publish raw messages, nor end the runtime.
+    /// The handler runs on a thread of the runtime and must return at once. It may publish; it must not
+    /// flush, publish raw messages or end the runtime.
     pub fn subscribe<M: RosMessage>(
         &self,
         topic: &str,
         qos: Qos,
-        load: Load,
+        executor: SubscriptionExecutor,
         mut handler: impl FnMut(Arc<M>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
-        self.subscribe_samples(topic, qos, load, move |sample, stats| {
+        self.subscribe_samples(topic, qos, executor, move |sample, stats| {
             if let Some(message) = stats.decode(sample) {
                 handler(message);
             }
         })
     }
 
-    /// A subscription whose handler gets messages undecoded, for the thread that works on them; otherwise
-    /// as [`Node::subscribe`]. For large messages that one thread must keep in order.
+    /// Subscribes with a handler that receives undecoded messages; otherwise as [`Node::subscribe`]. For large
+    /// messages that one thread must keep in order.
     pub fn subscribe_undecoded<M: RosMessage>(
         &self,
         topic: &str,
         qos: Qos,
-        load: Load,
+        executor: SubscriptionExecutor,
         mut handler: impl FnMut(Undecoded<M>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
-        self.subscribe_samples(topic, qos, load, move |sample, stats| {
+        self.subscribe_samples(topic, qos, executor, move |sample, stats| {
             handler(Undecoded::new(sample, stats));
         })
     }
 
-    /// Gives every message of other processes on a full topic name to `handler` as CDR bytes, encapsulation
-    /// header first, whatever the type. The handler is as that of [`Node::subscribe`].
+    /// Subscribes to a full topic name of any type in other processes; the handler receives CDR bytes,
+    /// encapsulation header first. Its restrictions are those of [`Node::subscribe`].
     pub fn subscribe_raw(
         &self,
         resolved_topic: &str,
         type_name: &str,
         qos: Qos,
-        load: Load,
+        executor: SubscriptionExecutor,
         handler: impl FnMut(Vec<u8>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         names::validate_full_name(resolved_topic)?;
         let (of, max) = ((resolved_topic, type_name), self.inner.max_message_bytes);
         self.inner
             .shared
-            .subscribe_raw(self.id(), of, &qos, load, max, handler)
+            .subscribe_raw(self.id(), of, &qos, executor, max, handler)
     }
 
-    /// Publishers in other processes that are known by now, on any topic.
+    /// Known publishers of other processes, on any topic.
     pub fn remote_publishers(&self) -> Vec<RemotePublisher> {
         self.inner.shared.remote_publishers()
     }
 
-    /// Publishers, subscriptions and servers that are known by now, of the nodes of all processes. The names of
-    /// nodes elsewhere follow soon after the first call.
+    /// Known publishers, subscriptions and servers of the nodes of all processes. Node names of other processes
+    /// arrive soon after the first call.
     pub fn graph(&self) -> Vec<GraphEndpoint> {
         self.inner.shared.graph_of_all()
     }
@@ -270,14 +270,14 @@ impl Node {
         &self,
         topic: &str,
         qos: Qos,
-        load: Load,
+        executor: SubscriptionExecutor,
         mut handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
         let resolved = self.resolve(topic)?;
         let qos = qos.with_overrides(&self.inner.params, &resolved, topic)?;
         let max = self.inner.max_message_bytes;
         let gate = Arc::clone(&self.inner.gate);
-        // Latched samples come once: an inactive node that dropped them would never have them.
+        // Latched samples are sent once: an inactive node that dropped them would never receive them.
         let latched = qos.durability == Durability::TransientLocal;
         let handler = move |sample: Sample<'_, M>, stats: &Arc<Stats>| {
             if latched || gate.is_open() {
@@ -286,11 +286,11 @@ impl Node {
         };
         self.inner
             .shared
-            .subscribe(self.id(), &resolved, &qos, load, max, handler)
+            .subscribe(self.id(), &resolved, &qos, executor, max, handler)
     }
 }
 
-/// Lets a clock go by simulated time as long as the parameter `use_sim_time` says so.
+/// Switches a clock to simulated time while the parameter `use_sim_time` is true.
 fn follow_use_sim_time(
     shared: &Arc<Shared>,
     node: NodeId,

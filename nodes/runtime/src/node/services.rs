@@ -1,4 +1,4 @@
-//! Services of a node.
+//! Services and clients of a node.
 
 use lattice_msgs::RosService;
 use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
@@ -19,8 +19,8 @@ impl Node {
         self.service_later::<S>(name, move |request, reply| reply.send(handler(request)))
     }
 
-    /// Serves `S` with answers that may take their time: the handler runs on the io thread and must
-    /// return at once, the reply may be sent later. The next request waits until then.
+    /// Serves `S` with deferred replies: the handler runs on the io thread and must return at once, the reply
+    /// may be sent later. The next request waits until then.
     pub fn service_later<S: RosService + 'static>(
         &self,
         name: &str,
@@ -29,7 +29,7 @@ impl Node {
         self.service_concurrent::<S>(name, 1, handler)
     }
 
-    /// Serves `S` with answers that may take their time, up to `max_pending` of them at a time; further
+    /// Serves `S` with up to `max_pending` deferred replies; further
     /// requests wait.
     pub fn service_concurrent<S: RosService + 'static>(
         &self,
@@ -42,13 +42,13 @@ impl Node {
             .serve::<S>(self.id(), &name, max_pending, handler)
     }
 
-    /// A client of `S`. Its endpoints are made at its first call.
+    /// Creates a client of `S`. Its endpoints are created at its first call.
     pub fn client<S: RosService>(&self, name: &str) -> Result<Client, RuntimeError> {
         let name = self.full_name(NameKind::Service, name)?;
         Ok(self.shared().client::<S>(self.id(), name))
     }
 
-    /// Serves `std_srvs/srv/Trigger`; the handler answers success and what came of it.
+    /// Serves `std_srvs/srv/Trigger`; the handler returns success and a message.
     pub fn service_trigger(
         &self,
         name: &str,

@@ -1,10 +1,10 @@
-//! Budget of the bytes that wait in the queue of one publisher.
+//! Byte budget of the queue of one publisher.
 
 use std::sync::Mutex;
 
 use crate::sync::{Changed, lock};
 
-/// Counts bytes against a limit. One message always fits, however long.
+/// Byte counter with a limit. One message always fits, of any length.
 pub(crate) struct Budget {
     limit: usize,
     state: Mutex<State>,
@@ -24,7 +24,7 @@ impl State {
 }
 
 impl Budget {
-    /// `limit` in bytes.
+    /// Creates a budget of `limit` bytes.
     pub(crate) fn new(limit: usize) -> Self {
         Self {
             limit,
@@ -33,7 +33,7 @@ impl Budget {
         }
     }
 
-    /// Takes `bytes` if they fit.
+    /// Reserves `bytes` if they fit.
     pub(crate) fn try_take(&self, bytes: usize) -> bool {
         let mut state = lock(&self.state);
         let fits = state.fits(bytes, self.limit);
@@ -43,7 +43,7 @@ impl Budget {
         fits
     }
 
-    /// Completes when `bytes` fit and are taken. False: closed meanwhile.
+    /// Completes when `bytes` are reserved. False: closed meanwhile.
     pub(crate) async fn take(&self, bytes: usize) -> bool {
         let taken = || {
             let closed = lock(&self.state).closed;
@@ -52,7 +52,7 @@ impl Budget {
         self.freed.until(taken).await
     }
 
-    /// Completes when `bytes` fit and `has_place`, asked each time that bytes were given back, or closed.
+    /// Completes when `bytes` fit and `has_place` is true, checked at each release, or when closed.
     pub(crate) async fn room(&self, bytes: usize, has_place: impl Fn() -> bool) {
         let fits = || {
             let state = lock(&self.state);
@@ -61,14 +61,14 @@ impl Budget {
         self.freed.until(fits).await;
     }
 
-    /// Gives `bytes` back.
+    /// Releases `bytes`.
     pub(crate) fn give_back(&self, bytes: usize) {
         let mut state = lock(&self.state);
         state.used = state.used.saturating_sub(bytes);
         self.freed.notify();
     }
 
-    /// Refuses further bytes; everyone who waits for room is refused.
+    /// Rejects further and pending reservations.
     pub(crate) fn close(&self) {
         lock(&self.state).closed = true;
         self.freed.notify();

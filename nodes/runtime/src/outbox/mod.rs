@@ -1,7 +1,7 @@
-//! The bounded queue in front of one writer, served by the publisher thread.
+//! Bounded queue of one writer, served by the publisher thread.
 //!
-//! Serialization, page faults and the wait for a full send window happen there, never at the caller;
-//! a writer that waits holds up nobody but its own queue.
+//! Serialization, page faults and the wait for a full send window happen there, not in the caller;
+//! a blocked writer delays its own queue only.
 
 mod budget;
 #[cfg(test)]
@@ -26,28 +26,28 @@ use crate::port::{Bytes, ENCAPSULATION_BYTES, EndpointId, SampleId, SampleWriter
 use crate::shutdown::Shutdown;
 use crate::sync::lock;
 
-/// Longest time that a sample waits for a full send window before it is dropped.
+/// Longest wait of a sample for a full send window before it is dropped.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// The same, after a sample was dropped: a peer that hangs must not slow down the others.
+/// Longest wait after a sample was dropped: a stalled peer must not slow down the others.
 const PATIENCE_WITH_STUCK_PEER: Duration = Duration::from_millis(20);
 
-/// Consecutive samples after which the task of a queue yields to the other tasks of its thread.
+/// Consecutive samples of a queue before its task yields to others of the thread.
 const JOBS_PER_TURN: u32 = 16;
 
-/// Between two warnings of dropped messages.
+/// Period of warnings about dropped messages.
 const WARNING_PERIOD: Duration = Duration::from_secs(5);
 
-/// Fate of a sample that finds the send window full.
+/// Policy for a full send window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WhenFull {
-    /// Dropped and counted after a short wait.
+    /// Drop and count the sample after a short wait.
     Drop,
-    /// Waits as long as it takes.
+    /// Wait without a limit.
     Wait,
 }
 
-/// Makes the bytes of a sample, encapsulation header included, on the publisher thread.
+/// Serializes a sample, encapsulation header included, on the publisher thread.
 pub(crate) type Serialize = Box<dyn FnOnce() -> Result<Vec<u8>, CdrError> + Send>;
 
 enum Job {
@@ -56,7 +56,7 @@ enum Job {
         reserved: usize,
         related: Option<SampleId>,
     },
-    /// Answered when everything before it has been handed to DDS.
+    /// Replied to when everything before it has been passed to DDS.
     Flush(Sender<()>),
 }
 
@@ -65,22 +65,22 @@ enum Content {
     Later(Serialize),
 }
 
-/// The queue of one writer, at its caller.
+/// Queue of one writer, as seen by its caller.
 pub(crate) struct Outbox {
     id: EndpointId,
     jobs: Sender<Job>,
     shared: Arc<Shared>,
 }
 
-/// Both ends.
+/// State shared by both ends.
 struct Shared {
     topic: String,
-    // Taken away at shutdown, when handles of the publisher may still be about.
+    // Removed at shutdown, when handles of the publisher may still exist.
     writer: Mutex<Option<Arc<dyn SampleWriter>>>,
     budget: Budget,
     when_full: WhenFull,
     last_bytes: AtomicUsize,
-    /// Samples in the queue, and the one that is being written.
+    /// Samples in the queue, including the one being written.
     waiting: AtomicUsize,
     dropped: AtomicU64,
     sent: AtomicU64,
@@ -90,7 +90,7 @@ struct Shared {
 }
 
 impl Outbox {
-    /// The writer, and the task that the publisher thread is to run.
+    /// Creates the queue and the task for the publisher thread.
     pub(crate) fn new(
         topic: &str,
         writer: Arc<dyn SampleWriter>,
@@ -117,7 +117,7 @@ impl Outbox {
         (Self { id, jobs, shared }, task)
     }
 
-    /// Identity of the writer.
+    /// GUID of the writer.
     pub(crate) fn id(&self) -> EndpointId {
         self.id
     }
@@ -127,41 +127,41 @@ impl Outbox {
         &self.shared.topic
     }
 
-    /// Samples that were not sent: queue or send window full, or not serializable.
+    /// Samples not sent: queue or send window full, or not serializable.
     pub(crate) fn dropped(&self) -> u64 {
         self.shared.dropped.load(Relaxed)
     }
 
-    /// Samples handed to DDS.
+    /// Samples passed to DDS.
     pub(crate) fn sent(&self) -> u64 {
         self.shared.sent.load(Relaxed)
     }
 
-    /// Bytes of them, without their encapsulation headers.
+    /// Bytes passed to DDS, without encapsulation headers.
     pub(crate) fn sent_bytes(&self) -> u64 {
         self.shared.sent_bytes.load(Relaxed)
     }
 
-    /// Samples handed to DDS that reliable readers have not acknowledged, or had not when they left.
+    /// Samples passed to DDS and not acknowledged by reliable readers, including readers that have left.
     pub(crate) fn unacknowledged(&self) -> u64 {
         let writer = self.shared.writer();
         writer.map_or(0, |writer| writer.unacknowledged())
     }
 
-    /// True if nothing waits in the queue and every reliable reader has acknowledged. Does not wait.
+    /// True if the queue is empty and every reliable reader has acknowledged. Does not wait.
     pub(crate) fn is_acknowledged(&self) -> bool {
         let acknowledged =
             |writer: Arc<dyn SampleWriter>| writer.wait_for_acknowledgments(Duration::ZERO);
         self.shared.waiting.load(Acquire) == 0 && self.shared.writer().is_none_or(acknowledged)
     }
 
-    /// Queues a sample that is serialized later. Its size is taken to be that of the one before.
+    /// Queues a sample for later serialization. Its size is assumed to be that of the one before.
     pub(crate) fn send(&self, serialize: Serialize) -> Result<(), PublishError> {
         let bytes = self.shared.last_bytes.load(Relaxed);
         self.try_queue(Content::Later(serialize), bytes, None)
     }
 
-    /// Queues the body of a sample, as it is.
+    /// Queues the serialized body of a sample.
     pub(crate) fn send_body(
         &self,
         body: Bytes,
@@ -171,8 +171,8 @@ impl Outbox {
         self.try_queue(Content::Body(body), bytes, related)
     }
 
-    /// Queues the body of a sample; waits while the queue is full, but no longer than `patience` and not
-    /// beyond a request to end. Not from the runtime's threads.
+    /// Queues the serialized body of a sample; waits up to `patience` while the queue is full, or until a shutdown
+    /// request. Not from the runtime's threads.
     pub(crate) fn send_body_within(
         &self,
         body: Bytes,
@@ -209,7 +209,7 @@ impl Outbox {
         outcome
     }
 
-    /// Waits until a sample of so many bytes finds room in the queue. False: not in time.
+    /// Waits until a sample of `bytes` fits into the queue. False: timeout.
     pub(crate) fn has_room_within(&self, bytes: usize, patience: Duration) -> bool {
         let room = async {
             self.shared
@@ -225,7 +225,7 @@ impl Outbox {
         smol::block_on(or(room, late))
     }
 
-    /// Waits until the queue is empty and every reliable reader has acknowledged. False: not in time.
+    /// Waits until the queue is empty and every reliable reader has acknowledged. False: timeout.
     pub(crate) fn flush(&self, timeout: Duration) -> bool {
         let start = Instant::now();
         let in_time = smol::block_on(smol::future::or(self.flushed(), async {
@@ -237,14 +237,14 @@ impl Outbox {
         in_time.is_some() && self.shared.writer().is_some_and(acknowledged)
     }
 
-    /// Completes when everything queued before has been handed to DDS; `None`: closed meanwhile.
+    /// Completes when everything queued before has been passed to DDS; `None`: closed meanwhile.
     pub(crate) async fn flushed(&self) -> Option<()> {
         let (done, answer) = bounded(1);
         self.jobs.send(Job::Flush(done)).await.ok()?;
         answer.recv().await.ok()
     }
 
-    /// Refuses further samples and leaves the topic.
+    /// Rejects further samples and leaves the topic.
     pub(crate) fn close(&self) {
         self.shared.budget.close();
         self.jobs.close();
@@ -296,7 +296,7 @@ impl Shared {
         lock(&self.writer).clone()
     }
 
-    /// A sample is out of the queue, sent or not.
+    /// Removes a sample, sent or not, from the accounting.
     fn done(&self, reserved: usize) {
         self.waiting.fetch_sub(1, Release);
         self.budget.give_back(reserved);
@@ -342,7 +342,9 @@ impl Shared {
                 Either::Left((result, _)) => result,
                 Either::Right(_) if may_wait => {
                     let topic = &self.topic;
-                    log::warn!("{topic}: waits for a reliable subscriber that does not answer");
+                    log::warn!(
+                        "{topic}: waiting for a reliable subscriber that does not acknowledge"
+                    );
                     continue;
                 }
                 Either::Right(_) => {
@@ -358,7 +360,7 @@ impl Shared {
                     self.sent_bytes.fetch_add(body.len() as u64, Relaxed);
                     return;
                 }
-                // The transport gave up waiting; whether we do is decided by our own patience.
+                // The transport's timeout is shorter; our own patience decides.
                 Err(WriteRefusal::Full) => {}
                 Err(WriteRefusal::Failed(why)) => {
                     self.drop_one(&why);
@@ -388,7 +390,7 @@ async fn serve(shared: Arc<Shared>, queue: Receiver<Job>) {
                 shared.done(reserved);
             }
             Job::Flush(done) => {
-                // Nobody may be waiting any more.
+                // The receiver may be gone.
                 let _ = done.try_send(());
             }
         }

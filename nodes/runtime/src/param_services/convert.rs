@@ -1,4 +1,4 @@
-//! Parameters as messages.
+//! Conversion of parameters from and to messages.
 
 use lattice_msgs::rcl_interfaces::{
     FloatingPointRange, IntegerRange, Parameter, ParameterDescriptor, ParameterValue,
@@ -6,7 +6,7 @@ use lattice_msgs::rcl_interfaces::{
 
 use crate::params::{Declared, ParamValue, Range};
 
-/// Parameters of an event.
+/// Parameter list of an event.
 pub(super) fn messages(values: impl IntoIterator<Item = (String, ParamValue)>) -> Vec<Parameter> {
     let values = values.into_iter();
     let message = |(name, value)| Parameter {
@@ -34,7 +34,7 @@ pub(super) fn value_message(value: &ParamValue) -> ParameterValue {
     message
 }
 
-/// The value of a message; `None`: the parameter is to go. The error is a type that no parameter has.
+/// Value of a message; `None`: the parameter is to be removed. The error is an unknown parameter type.
 pub(super) fn value_from(message: ParameterValue) -> Result<Option<ParamValue>, String> {
     Ok(Some(match message.type_ {
         0 => return Ok(None),
@@ -46,11 +46,11 @@ pub(super) fn value_from(message: ParameterValue) -> Result<Option<ParamValue>, 
         7 => ParamValue::I64Array(message.integer_array_value),
         8 => ParamValue::F64Array(message.double_array_value),
         9 => ParamValue::StringArray(message.string_array_value),
-        other => return Err(format!("no parameter is of type {other}")),
+        other => return Err(format!("parameter type {other} is outside 0..=9")),
     }))
 }
 
-/// All that is known of a parameter besides its value.
+/// Descriptor of a parameter: everything but its value.
 pub(super) fn descriptor(name: &str, declared: &Declared) -> ParameterDescriptor {
     let mut message = ParameterDescriptor {
         name: name.to_owned(),

@@ -1,4 +1,4 @@
-//! The parameter services of a node and its `/parameter_events`, for `ros2 param` and its like.
+//! Parameter services of a node and its `/parameter_events`, for `ros2 param` and similar tools.
 
 mod convert;
 mod set;
@@ -22,17 +22,17 @@ use super::params::{ParamValue, Params};
 use super::qos::Qos;
 use super::service::Server;
 
-/// Most names or parameters of one request; none of more are answered.
+/// Limit of names or parameters per request; a larger request gets an empty reply.
 const MAX_NAMES: usize = 1000;
-/// Items of arrays and bytes of strings in one answer, at most.
+/// Limit of array items plus string bytes per reply.
 const MAX_ANSWER_LENGTH: usize = 1 << 20;
 
-/// Serves the six parameter services of `node` for as long as the servers live, and tells of new and
+/// Serves the six parameter services of `node` while the servers exist, and publishes new and
 /// changed parameters.
 pub(crate) fn serve(node: &Node, params: &Arc<Params>) -> Result<Vec<Server>, RuntimeError> {
-    // Permissions from before there were events leave them out.
+    // Older access permissions do not include the events.
     if let Err(error) = tell_events(node, params) {
-        log::warn!("changes of parameters are not published: {error}");
+        log::warn!("parameter events are not published: {error}");
     }
     Ok(vec![
         answer::<GetParameters>(node, "~/get_parameters", params, get_values)?,
@@ -79,10 +79,12 @@ fn get_values(params: &Params, request: &GetParametersRequest) -> GetParametersR
             .iter()
             .map(|name| declared.get(name))
     };
-    // A small request can name a large value a thousand times.
+    // A small request can name a large value many times.
     let length: usize = values().flatten().map(ParamValue::length).sum();
     if length > MAX_ANSWER_LENGTH {
-        log::warn!("a request for parameters of {length} bytes and items is answered with none");
+        log::warn!(
+            "parameter values of {length} bytes and items exceed {MAX_ANSWER_LENGTH}; replied with none"
+        );
         return GetParametersResponse::default();
     }
     let message = |value: Option<&ParamValue>| value.map(value_message).unwrap_or_default();
@@ -117,7 +119,7 @@ fn describe_all(
     }
 }
 
-/// The names of a request, none if there are too many.
+/// Names of a request; empty if there are too many.
 fn bounded<T>(names: &[T]) -> &[T] {
     match names.len() <= MAX_NAMES {
         true => names,

@@ -1,6 +1,6 @@
 //! Services that set parameters.
 //!
-//! They answer from a thread of their own: a node reads all its options anew, and a clock may be subscribed to.
+//! They reply from a separate thread: a node parses all its options, and a clock may be subscribed to.
 
 use std::sync::Arc;
 use std::thread;
@@ -18,7 +18,7 @@ use crate::node::Node;
 use crate::params::{ParamValue, Params, Refusal};
 use crate::service::Server;
 
-/// Serves `set_parameters`: each is set by itself.
+/// Serves `set_parameters`: each parameter is set individually.
 pub(super) fn serve_each(node: &Node, params: &Arc<Params>) -> Result<Server, RuntimeError> {
     serve::<SetParameters>(node, "~/set_parameters", params, |params, request| {
         SetParametersResponse {
@@ -27,7 +27,7 @@ pub(super) fn serve_each(node: &Node, params: &Arc<Params>) -> Result<Server, Ru
     })
 }
 
-/// Serves `set_parameters_atomically`: all are set, or none.
+/// Serves `set_parameters_atomically`: all parameters are set, or none.
 pub(super) fn serve_atomically(node: &Node, params: &Arc<Params>) -> Result<Server, RuntimeError> {
     let name = "~/set_parameters_atomically";
     serve::<SetParametersAtomically>(node, name, params, |params, request| {
@@ -88,7 +88,7 @@ fn set_all(params: &Params, wanted: Vec<Parameter>) -> SetParametersResult {
 }
 
 fn too_many() -> SetParametersResult {
-    result(Err(format!("more than {MAX_NAMES} parameters at once")))
+    result(Err(format!("request exceeds {MAX_NAMES} parameters")))
 }
 
 fn result(set: Result<(), String>) -> SetParametersResult {

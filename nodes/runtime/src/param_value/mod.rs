@@ -1,4 +1,4 @@
-//! Values of parameters, and the YAML that they are written in.
+//! Parameter values and their YAML syntax.
 
 mod scan;
 
@@ -9,7 +9,7 @@ use serde_yaml::Value;
 use std::fmt;
 use thiserror::Error;
 
-/// A parameter's value, of the types ROS has.
+/// Value of a parameter, of one of the ROS types.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ParamValue {
     /// `true`
@@ -30,11 +30,11 @@ pub enum ParamValue {
     StringArray(Vec<String>),
 }
 
-/// Reason why a YAML value is no parameter value.
+/// Reason why a YAML value is not a parameter value.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ValueError {
-    /// Nothing, or `null`.
-    #[error("there is no value; write '' for an empty text")]
+    /// Empty value, or `null`.
+    #[error("the value is missing; write '' for an empty text")]
     Missing,
     /// A map, a list of lists, or a tag.
     #[error("found {0}, expected a bool, an integer, a float, a text or a list of one of them")]
@@ -42,21 +42,21 @@ pub enum ValueError {
     /// A list of several types.
     #[error("found a list with {0} and {1}, expected one type (write 1.0 for 1 among floats)")]
     Mixed(&'static str, &'static str),
-    /// Anchors, aliases, or too deep nesting.
+    /// Anchors, aliases, or excessive nesting.
     #[error(transparent)]
     Scan(#[from] ScanError),
-    /// No YAML at all.
-    #[error("it is no YAML: {0}")]
+    /// Invalid YAML.
+    #[error("invalid YAML: {0}")]
     Yaml(String),
 }
 
 impl ParamValue {
-    /// Reads the value of `-p name:=value`.
+    /// Parses the value of `-p name:=value`.
     pub fn from_yaml_text(text: &str) -> Result<ParamValue, ValueError> {
         scan(text)?;
         let value = serde_yaml::from_str(text).map_err(|e| ValueError::Yaml(e.to_string()))?;
         match (value, text.trim()) {
-            // For rcl these are texts, and an empty value is none.
+            // rcl reads these as texts, and an empty value as missing.
             (Value::Null, text @ ("~" | "null" | "Null" | "NULL")) => {
                 Ok(ParamValue::String(text.to_owned()))
             }
@@ -64,14 +64,14 @@ impl ParamValue {
         }
     }
 
-    /// Takes a YAML value over.
+    /// Converts a YAML value.
     pub(crate) fn from_yaml(value: Value) -> Result<ParamValue, ValueError> {
         match value {
             Value::Null => Err(ValueError::Missing),
             Value::Bool(value) => Ok(ParamValue::Bool(value)),
             Value::Number(number) => match (number.as_i64(), number.as_f64()) {
                 (Some(value), _) => Ok(ParamValue::I64(value)),
-                // Beyond an i64 rcl reads a double, too.
+                // rcl, too, reads integers beyond i64 as doubles.
                 (None, Some(value)) => Ok(ParamValue::F64(value)),
                 (None, None) => Err(ValueError::Shape("a number out of range")),
             },
@@ -91,7 +91,7 @@ impl ParamValue {
             }
             values.push(value);
         }
-        // A list of `true` and `yes`, or of `8` and `010`, has one type for rcl and two for YAML 1.2.
+        // A list of `true` and `yes`, or of `8` and `010`, has one type in rcl and two in YAML 1.2.
         let is_text = |value: &&ParamValue| value.as_str().is_some();
         let typed = values.iter().find(|value| !is_text(value));
         let lead = typed.or(values.first());
@@ -114,7 +114,7 @@ impl ParamValue {
         })
     }
 
-    /// The name of the type, as messages print it.
+    /// Name of the type for messages.
     pub fn type_name(&self) -> &'static str {
         match self {
             ParamValue::Bool(_) => "a bool",
@@ -129,7 +129,7 @@ impl ParamValue {
         }
     }
 
-    /// The code of the type in `rcl_interfaces/msg/ParameterType`.
+    /// Code of the type in `rcl_interfaces/msg/ParameterType`.
     pub fn type_code(&self) -> u8 {
         match self {
             ParamValue::Bool(_) => 1,
@@ -143,7 +143,7 @@ impl ParamValue {
         }
     }
 
-    /// The name of the type in rclcpp's messages.
+    /// Name of the type in messages of rclcpp.
     pub fn ros_type_name(&self) -> &'static str {
         match self {
             ParamValue::Bool(_) => "bool",
@@ -161,7 +161,7 @@ impl ParamValue {
         self.type_code() > 5
     }
 
-    /// Bytes of a text, or of all texts of a list, or items of a list.
+    /// Length: bytes of a text or of all texts of a list, else items of a list.
     pub(crate) fn length(&self) -> usize {
         match self {
             ParamValue::String(text) => text.len(),
@@ -177,7 +177,7 @@ impl ParamValue {
         self.is_array() && self.length() == 0
     }
 
-    /// The empty list of the same type; other values as they are.
+    /// Empty list of the same type; other values unchanged.
     pub(crate) fn emptied(&self) -> ParamValue {
         match self {
             ParamValue::BoolArray(_) => ParamValue::BoolArray(Vec::new()),
@@ -188,7 +188,7 @@ impl ParamValue {
         }
     }
 
-    /// The value as rcl would read it where a bool is wanted.
+    /// Value as a bool by the rules of rcl.
     pub(crate) fn as_bool(&self) -> Option<bool> {
         match self {
             ParamValue::Bool(value) => Some(*value),
@@ -201,7 +201,7 @@ impl ParamValue {
         }
     }
 
-    /// The value as rcl would read it where an integer is wanted.
+    /// Value as an integer by the rules of rcl.
     pub(crate) fn as_i64(&self) -> Option<i64> {
         match self {
             ParamValue::I64(value) => Some(*value),
@@ -210,7 +210,7 @@ impl ParamValue {
         }
     }
 
-    /// The value where a float is wanted; integers count.
+    /// Value as a float; integers are converted.
     pub(crate) fn as_f64(&self) -> Option<f64> {
         match self {
             ParamValue::F64(value) => Some(*value),
@@ -222,7 +222,7 @@ impl ParamValue {
         }
     }
 
-    /// The value where a text is wanted.
+    /// Value as a text.
     pub(crate) fn as_str(&self) -> Option<&str> {
         match self {
             ParamValue::String(text) => Some(text),
@@ -230,7 +230,7 @@ impl ParamValue {
         }
     }
 
-    /// The items of a list, each as a value.
+    /// Items of a list as values.
     pub(crate) fn items(&self) -> Option<Vec<ParamValue>> {
         fn each<T: Clone>(items: &[T], wrap: fn(T) -> ParamValue) -> Option<Vec<ParamValue>> {
             Some(items.iter().cloned().map(wrap).collect())
@@ -245,17 +245,17 @@ impl ParamValue {
     }
 }
 
-/// All values read alike; `None` if one of them cannot be.
+/// Converts all values; `None` if one fails.
 fn each<T>(values: &[ParamValue], read: impl Fn(&ParamValue) -> Option<T>) -> Option<Vec<T>> {
     values.iter().map(read).collect()
 }
 
-/// True if the text can have stood without quotes: YAML itself does not read it as something else.
+/// True if the text may have been unquoted: YAML would not parse it as another type.
 fn may_be_plain(text: &str) -> bool {
     matches!(serde_yaml::from_str(text), Ok(Value::String(plain)) if plain == text)
 }
 
-/// An integer as strtol reads it with base 0: decimal, `0x` hexadecimal, `0` octal.
+/// Integer by strtol with base 0: decimal, `0x` hexadecimal, `0` octal.
 fn c_integer(text: &str) -> Option<i64> {
     let negative = text.starts_with('-');
     let digits = text.strip_prefix(['-', '+']).unwrap_or(text);
@@ -272,7 +272,7 @@ fn c_integer(text: &str) -> Option<i64> {
     i64::try_from(if negative { -magnitude } else { magnitude }).ok()
 }
 
-/// A decimal float that YAML 1.2 leaves a text, for example `08.5`.
+/// Decimal float that YAML 1.2 parses as a text, for example `08.5`.
 fn c_float(text: &str) -> Option<f64> {
     let is_decimal = |byte: u8| byte.is_ascii_digit() || b"+-.eE".contains(&byte);
     let value: f64 = text.parse().ok()?;

@@ -1,15 +1,15 @@
-//! Refusal of YAML before it is read: anchors and aliases, which it resolves silently and rcl
-//! refuses, and deep nesting, on which its time grows with the square of the depth.
+//! Checks on YAML before parsing: anchors and aliases, which the parser would resolve and rcl rejects, and
+//! deep nesting, for which parsing time grows with the square of the depth.
 
 use thiserror::Error;
 
-/// Most brackets, braces and list dashes around a value.
+/// Limit of nested brackets, braces and list dashes around a value.
 const NESTING_MAX: usize = 64;
 
-/// Reason why a YAML text is refused before it is read.
+/// Reason for rejecting a YAML text before parsing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ScanError {
-    /// `&name` or `*name` where a value begins.
+    /// `&name` or `*name` at the start of a value.
     #[error(
         "line {line}: YAML anchors and aliases are not allowed; \
          write the value out, or quote a text that starts with & or *"
@@ -18,15 +18,15 @@ pub enum ScanError {
         /// The line, from 1.
         line: usize,
     },
-    /// Brackets, braces or list dashes in each other.
-    #[error("line {line}: nested more than 64 deep")]
+    /// Nesting of brackets, braces or list dashes above the limit.
+    #[error("line {line}: nesting is deeper than 64")]
     Deep {
         /// The line, from 1.
         line: usize,
     },
 }
 
-/// Refuses anchors, aliases and deep nesting outside quotes, comments and block texts.
+/// Rejects anchors, aliases and deep nesting outside quotes, comments and block texts.
 pub(crate) fn scan(text: &str) -> Result<(), ScanError> {
     let mut scan = Scan::default();
     for (index, text) in text.lines().enumerate() {
@@ -46,10 +46,10 @@ enum Found {
     Deep,
 }
 
-/// Quotes, brackets and texts that are open at the end of a line.
+/// Scanner state at the end of a line: open quotes, brackets and block texts.
 #[derive(Default)]
 struct Scan {
-    /// The quote a text began with.
+    /// Quote character of the open text.
     quote: Option<char>,
     /// Open brackets and braces.
     flow_depth: usize,
@@ -58,14 +58,14 @@ struct Scan {
 }
 
 impl Scan {
-    /// Reads a line up to what is to be refused.
+    /// Scans a line up to the first rejected construct.
     fn line(&mut self, line: &str) -> Found {
         let indent = line.chars().take_while(|c| *c == ' ').count();
         if self.block.is_some_and(|block| indent >= block) || line.trim().is_empty() {
             return Found::Nothing;
         }
         self.block = None;
-        // Whether the next character begins a node, and the column of the node around it.
+        // Whether the next character begins a node, and the column of the enclosing node.
         let mut begins = true;
         let mut parent = None;
         let mut before = ' ';

@@ -1,16 +1,16 @@
-//! Description of parameters: stated once, in tables beside the code that reads them.
+//! Parameter descriptions, declared once in tables beside the code that reads them.
 
 use super::{ParamValue, Params, State};
 use crate::sync::lock;
 
-/// Meaning of a parameter, and its fixedness.
+/// Description of a parameter, and whether it is read-only.
 #[derive(Debug, PartialEq, Eq)]
 pub struct About {
-    /// Full name; one that begins with `*` stands for all names that end with the rest.
+    /// Full name; a leading `*` matches all names with the rest as suffix.
     pub name: &'static str,
-    /// Meaning, with the unit where the name has none.
+    /// Meaning, with the unit if the name has none.
     pub text: &'static str,
-    /// Reason for which it cannot change while the node runs; none: it can.
+    /// Reason why it cannot change at run time; `None`: it can.
     pub fixed: Option<&'static str>,
 }
 
@@ -23,7 +23,7 @@ impl About {
     }
 }
 
-/// A table of [`About`]: `"name": "text";` for what may change, `"name" fixed("reason"): "text";` for the rest.
+/// Table of [`About`]: `"name": "text";` for settable parameters, `"name" fixed("reason"): "text";` for read-only ones.
 #[macro_export]
 macro_rules! about {
     (@) => { None };
@@ -37,44 +37,44 @@ macro_rules! about {
     };
 }
 
-/// Parameters of every node.
+/// Parameters that every node has.
 pub(super) const OF_EVERY_NODE: &[About] = about! {
-    "max_message_bytes" fixed("subscriptions are made with it"): "Longer messages are not taken, bytes.";
-    "use_sim_time": "Whether the node goes by the time on /clock.";
+    "max_message_bytes" fixed("subscriptions are made with it"): "Largest message accepted, bytes.";
+    "use_sim_time": "Whether the node uses the time on /clock.";
     "managed" fixed("it is read at the start"):
-        "Whether the node waits to be configured and activated, as ros2 lifecycle does it.";
+        "Whether the node is a lifecycle node, which waits to be configured and activated (ros2 lifecycle).";
     "start_type_description_service" fixed("the service is made at the start"):
         "Whether ~/get_type_description is served.";
-    "*.reliability" fixed(QOS): "Whether samples of the topic that were lost are sent again.";
-    "*.durability" fixed(QOS): "Whether who joins the topic late gets the last samples.";
-    "*.depth" fixed(QOS): "Samples of the topic that are kept.";
+    "*.reliability" fixed(QOS): "Reliability of the topic: reliable (lost samples are resent) or best_effort.";
+    "*.durability" fixed(QOS): "Durability of the topic: transient_local (late joiners receive the last samples) or volatile.";
+    "*.depth" fixed(QOS): "History depth of the topic, samples.";
 };
 
 const QOS: &str = "endpoints are made with it";
 
-/// Least and most of a number.
+/// Inclusive range of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Range {
-    /// Both count.
+    /// Inclusive integer range.
     Integer(i64, i64),
-    /// Both count.
+    /// Inclusive float range.
     Float(f64, f64),
 }
 
-/// A parameter that the node has read.
+/// A parameter declared by the node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Declared {
-    /// Value in use.
+    /// Current value.
     pub value: ParamValue,
-    /// Value where none is given.
+    /// Default value.
     pub default: ParamValue,
-    /// Least and most, where it has them.
+    /// Allowed range, if any.
     pub range: Option<Range>,
-    /// Words of which it is one; empty: any.
+    /// Allowed words; empty: any.
     pub allowed: String,
-    /// Meaning; none: nobody has stated it.
+    /// Description, if any.
     pub about: Option<&'static About>,
-    /// True once listeners know of it.
+    /// True after listeners were notified.
     pub(super) told: bool,
 }
 
@@ -99,13 +99,13 @@ impl Declared {
         self.about.map_or("", |about| about.text)
     }
 
-    /// Reason for which it cannot change while the node runs.
+    /// Reason why it cannot change at run time.
     pub fn fixed(&self) -> Option<&'static str> {
-        let unknown = "the node reads it at its start";
+        let unknown = "it is read at the start";
         self.about.map_or(Some(unknown), |about| about.fixed)
     }
 
-    /// Least and most, or the words of which it is one; empty: anything of its type.
+    /// Allowed range or words; empty: any value of its type.
     pub fn constraint(&self) -> String {
         match self.range {
             Some(Range::Integer(least, i64::MAX)) => format!("{least} or more"),
@@ -125,7 +125,7 @@ impl State {
 }
 
 impl Params {
-    /// Adds a table; for parameters that are read after it.
+    /// Adds a table, for parameters declared after it.
     pub fn describe(&self, table: &'static [About]) {
         let about = &mut lock(&self.state).about;
         if !about.contains(&table) {
@@ -133,7 +133,7 @@ impl Params {
         }
     }
 
-    /// A table of all parameters for `--help`: name, type and default, range, meaning.
+    /// Table of all parameters for `--help`: name, type, default, range, meaning.
     pub fn help(&self) -> String {
         let described = self.described();
         let lines = described.iter().map(|(name, declared)| {
@@ -181,7 +181,7 @@ mod tests {
         );
         assert_eq!(
             all["qos.map.depth"].text(),
-            "Samples of the topic that are kept."
+            "History depth of the topic, samples."
         );
         assert_eq!(all["frame"].constraint(), "map or odom");
         assert!(

@@ -5,44 +5,44 @@ use std::collections::BTreeMap;
 use super::{Given, Origin, ParamValue, Params, Range, State};
 use crate::sync::lock;
 
-/// Longest value that is taken, in characters or items.
+/// Longest accepted value, characters or items.
 const MAX_VALUE_LENGTH: usize = 1 << 16;
 
-/// Takes all parameters as they would be, or says why not; nothing changes then.
+/// Validates all candidate values, or returns the reason against them; then nothing changes.
 type Apply = Box<dyn FnMut(&Params) -> Result<(), String> + Send>;
 
-/// Hears of parameters that are new, and of those that have changed.
+/// Receives new and changed parameters.
 type Listener = Box<dyn FnMut(Values, Values) + Send>;
 
 /// Parameters by name.
 pub(crate) type Values = BTreeMap<String, ParamValue>;
 
-/// Those who take part in a change; one change at a time.
+/// Participants of a parameter change; one change at a time.
 #[derive(Default)]
 pub(super) struct Changes {
-    /// The node; none: it is not at work.
+    /// Callback of the node; `None`: it is not running.
     node: Option<Apply>,
     apply: Vec<Apply>,
     is_open: bool,
     listener: Option<Listener>,
 }
 
-/// Error of a change that is refused.
+/// Reason for rejecting a change.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Refusal {
-    /// No such parameter.
+    /// Undeclared parameter.
     #[error("parameter '{0}' cannot be set because it was not declared")]
     NotDeclared(String),
-    /// All else.
+    /// Any other reason.
     #[error("{0}")]
     Other(String),
 }
 
 impl Params {
-    /// Lets parameters be changed from now on, and tells listeners which there are.
+    /// Makes parameters settable, and notifies listeners of the declared ones.
     ///
-    /// `apply` is given all parameters as they would be: it reads its options as at the start, and hands
-    /// them to the node or says why not. It must return at once.
+    /// `apply` receives all candidate values: it parses its options as at the start, and passes
+    /// them to the node or returns the reason against them. It must return at once.
     pub fn open(&self, apply: impl FnMut(&Params) -> Result<(), String> + Send + 'static) {
         let mut changes = lock(&self.changes);
         changes.node = Some(Box::new(apply));
@@ -51,16 +51,16 @@ impl Params {
         self.tell_new();
     }
 
-    /// Lets nothing be changed any more, since the node is not at work.
+    /// Makes parameters read-only, since the node is not running.
     pub fn close(&self) {
         let mut changes = lock(&self.changes);
         changes.is_open = false;
         let node = changes.node.take();
-        // What the node handed over may end with it.
+        // Dropped outside the locks: values captured by the node may end with it.
         drop((changes, node));
     }
 
-    /// One more who is asked; the first says last.
+    /// Adds a further callback; the first one is called last.
     pub(crate) fn also_apply(
         &self,
         apply: impl FnMut(&Params) -> Result<(), String> + Send + 'static,
@@ -68,7 +68,7 @@ impl Params {
         lock(&self.changes).apply.insert(0, Box::new(apply));
     }
 
-    /// Sets who hears of changes, and tells it which parameters there are by now.
+    /// Sets the listener of changes, and notifies it of the declared parameters.
     pub(crate) fn listen(&self, listener: impl FnMut(Values, Values) + Send + 'static) {
         lock(&self.changes).listener = Some(Box::new(listener));
         self.tell_new();
@@ -90,7 +90,7 @@ impl Params {
         }
     }
 
-    /// Takes note of a value that the node has changed itself.
+    /// Records a value that the node has changed itself.
     pub fn note(&self, name: &str, value: ParamValue) {
         let mut changes = lock(&self.changes);
         let mut state = lock(&self.state);
@@ -104,7 +104,7 @@ impl Params {
         changes.tell(Values::new(), [(name.to_owned(), value)].into());
     }
 
-    /// Changes all of these, or none; `None` stands for a value that is to go.
+    /// Changes all of these parameters, or none; `None` removes a value.
     pub(crate) fn set(&self, wanted: Vec<(String, Option<ParamValue>)>) -> Result<(), Refusal> {
         let mut changes = lock(&self.changes);
         let values = lock(&self.state).check(wanted)?;
@@ -112,7 +112,7 @@ impl Params {
             return Ok(());
         }
         if !changes.is_open {
-            let reason = "the node is not at work yet, or no more";
+            let reason = "the node is not running";
             return Err(Refusal::Other(reason.to_owned()));
         }
         let candidate = self.candidate(&values);
@@ -133,10 +133,10 @@ impl Params {
         Ok(())
     }
 
-    /// All parameters as they would be, not declared yet.
+    /// All parameters with candidate values, not declared yet.
     fn candidate(&self, values: &Values) -> Params {
         let mut state = lock(&self.state).clone();
-        // As they were read: nothing is to be converted again.
+        // Values as parsed: they need no further conversion.
         for (name, given) in &mut state.given {
             if let Some(declared) = state.declared.get(name) {
                 given.value = declared.value.clone();
@@ -156,7 +156,7 @@ impl Params {
 }
 
 impl Given {
-    /// A value that was set at run time.
+    /// Value set at run time.
     fn set(value: ParamValue) -> Self {
         Self {
             value,
@@ -175,8 +175,8 @@ impl Changes {
 }
 
 impl State {
-    /// The values to be set, if each by itself may be; in the order of rclcpp's checks. A fixed parameter
-    /// may be given the value that it has.
+    /// Checks each value, in the order of rclcpp's checks; returns the values to set. A read-only parameter
+    /// accepts its current value.
     fn check(&self, wanted: Vec<(String, Option<ParamValue>)>) -> Result<Values, Refusal> {
         let refuse = |reason: String| Err(Refusal::Other(reason));
         if wanted.is_empty() {
@@ -189,7 +189,7 @@ impl State {
             };
             let value = value.map(|value| of_yaml(value, &declared.value));
             match declared.fixed() {
-                // `ros2 param load` sets all that `ros2 param dump` has written.
+                // `ros2 param load` sets everything that `ros2 param dump` has written.
                 Some(_) if value.as_ref() == Some(&declared.value) => {}
                 Some(why) => {
                     return refuse(format!(
@@ -230,9 +230,9 @@ impl State {
     }
 }
 
-/// A value that a tool has read from YAML, by the value that is set now.
+/// Converts a value that a tool has parsed from YAML to the type of the current value.
 ///
-/// `ros2 param load` reads each value twice: an empty list has no type, the text `off` becomes a bool, and the
+/// `ros2 param load` parses each value twice: an empty list has no type, the text `off` becomes a bool, and the
 /// number `1e-06` a text.
 fn of_yaml(value: ParamValue, now: &ParamValue) -> ParamValue {
     let is_same = match (now, &value) {
@@ -251,7 +251,7 @@ fn of_yaml(value: ParamValue, now: &ParamValue) -> ParamValue {
     }
 }
 
-/// Kind of the range that the value is not in.
+/// Kind of the violated range.
 fn outside(range: Option<Range>, value: &ParamValue) -> Option<&'static str> {
     match (range, value) {
         (Some(Range::Integer(least, most)), ParamValue::I64(value)) => {

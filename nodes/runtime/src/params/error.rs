@@ -1,30 +1,30 @@
 use crate::params_file::ParamFileError;
 use thiserror::Error;
 
-/// Reason why parameters are refused.
+/// Reason for rejecting parameters.
 #[derive(Debug, Error)]
 pub enum ParamError {
-    /// A parameter file is refused.
+    /// A parameter file is rejected.
     #[error(transparent)]
     File(#[from] ParamFileError),
-    /// The value has another type than the node asks for.
+    /// The value has another type than declared.
     #[error("parameter `{name}` of {node}: expected {expected}, found {found} ({origin})")]
     Type {
-        /// The node's full name.
+        /// Full name of the node.
         node: String,
         /// The parameter.
         name: String,
-        /// The type the node asks for, and how to write it.
+        /// Declared type, and how to write it.
         expected: &'static str,
-        /// Type and value that were given.
+        /// Type and value found.
         found: String,
         /// File, command line or default.
         origin: String,
     },
-    /// The value has the right type and cannot be used.
+    /// The value has the declared type but is invalid.
     #[error("parameter `{name}` of {node} = {value} ({origin}): {problem}")]
     Invalid {
-        /// The node's full name.
+        /// Full name of the node.
         node: String,
         /// The parameter.
         name: String,
@@ -32,7 +32,7 @@ pub enum ParamError {
         value: String,
         /// File, command line or default.
         origin: String,
-        /// The problem with it, and what would be right.
+        /// What is wrong, and the allowed values.
         problem: String,
     },
     /// The node has no such parameter.
@@ -40,11 +40,11 @@ pub enum ParamError {
     Unknown {
         /// The parameter.
         name: String,
-        /// The node's name, or those of several.
+        /// Name of the node or nodes.
         node: String,
-        /// The place of a file in brackets after a space; empty: the command line.
+        /// Place in a file, in parentheses after a space; empty: the command line.
         origin: String,
-        /// The nearest name, or how to see all of them.
+        /// Nearest name, or how to list all names.
         remedy: String,
     },
 }

@@ -1,5 +1,5 @@
-//! Parameters of a node: given by files and the command line, declared by the node as it reads them, and
-//! changed while it runs.
+//! Parameters of a node: given by files and the command line, declared by reading them, and changed at
+//! run time.
 
 mod about;
 mod change;
@@ -25,9 +25,9 @@ use crate::params_file::{self, NodePattern};
 use crate::ros_args::RosArgs;
 use crate::sync::lock;
 
-/// The parameters of one node.
+/// Parameters of one node.
 ///
-/// Reading a parameter declares it; [`Params::open`] lets others change it.
+/// Reading a parameter declares it; [`Params::open`] allows changes by services.
 #[derive(Default)]
 pub struct Params {
     node: String,
@@ -47,7 +47,7 @@ struct State {
 struct Given {
     value: ParamValue,
     origin: Origin,
-    /// True if it is for this node by name; false: for all nodes that are given the file or the arguments.
+    /// True if it addresses this node by name; false if it addresses all nodes of the file or the arguments.
     named: bool,
 }
 
@@ -77,22 +77,22 @@ impl std::fmt::Debug for Params {
 }
 
 impl Params {
-    /// Reads the parameters of the node `node_fqn` (for example `/robot/mapper`).
+    /// Loads the parameters of the node `node_fqn` (for example `/robot/mapper`).
     ///
-    /// Files count in the order given, then the command line; what comes later wins.
+    /// Files apply in the given order, then the command line; the last value is used.
     pub fn load(args: &RosArgs, node_fqn: &str) -> Result<Params, ParamError> {
         Self::load_renamed(args, node_fqn, name_of(node_fqn))
     }
 
-    /// The same of the node that is called `code_name` in the code, under the name and namespace that the
+    /// Loads the parameters of the node `code_name`, under the name and namespace that the
     /// arguments give it.
     pub fn of_node(args: &RosArgs, code_name: &str) -> Result<Params, ParamError> {
         let (name, namespace) = (args.node_name(code_name), args.namespace(code_name));
         Self::load_renamed(args, &names::fully_qualified(&name, &namespace), code_name)
     }
 
-    /// The same for a node that is called `code_name` in the code: of a file that does not name the node
-    /// itself, it takes what is under that name, which rcl does not do.
+    /// Loads the parameters of a renamed node. If a file does not address the new name, the section of
+    /// `code_name` applies, unlike in rcl.
     pub(crate) fn load_renamed(
         args: &RosArgs,
         node_fqn: &str,
@@ -115,7 +115,7 @@ impl Params {
         Ok(params)
     }
 
-    /// Parameters as if from the command line, for a node made by other code.
+    /// Parameters as if from the command line, for a node created by code.
     pub fn from_values<N: Into<String>>(
         node_fqn: &str,
         values: impl IntoIterator<Item = (N, ParamValue)>,
@@ -157,49 +157,49 @@ impl Params {
         lock(&self.state).given.insert(name, given);
     }
 
-    /// A bool; `yes`, `on`, `no`, `off` count.
+    /// Reads a bool; `yes`, `on`, `no` and `off` are accepted.
     pub fn bool(&self, name: &str, default: bool) -> Result<bool, ParamError> {
         let expected = "a bool (true or false)";
         let read = ParamValue::as_bool;
         self.read(name, default, expected, read, ParamValue::Bool)
     }
 
-    /// An integer; `0x1F` and the octal `010` count.
+    /// Reads an integer; `0x1F` and octal `010` are accepted.
     pub fn i64(&self, name: &str, default: i64) -> Result<i64, ParamError> {
         let expected = "an integer (no point, no exponent, no quotes)";
         let read = ParamValue::as_i64;
         self.read(name, default, expected, read, ParamValue::I64)
     }
 
-    /// A float, never NaN; an integer counts, with a line in the log.
+    /// Reads a float other than NaN; an integer is converted and logged.
     pub fn f64(&self, name: &str, default: f64) -> Result<f64, ParamError> {
         let expected = "a float (with a point, no quotes)";
         let read = |value: &ParamValue| self.float(name, value);
         self.read(name, default, expected, read, ParamValue::F64)
     }
 
-    /// A text.
+    /// Reads a text.
     pub fn string(&self, name: &str, default: &str) -> Result<String, ParamError> {
         let expected = "a text (in quotes)";
         let read = |value: &ParamValue| value.as_str().map(str::to_owned);
         self.read(name, default.to_owned(), expected, read, ParamValue::String)
     }
 
-    /// A list of integers.
+    /// Reads a list of integers.
     pub fn i64_array(&self, name: &str, default: &[i64]) -> Result<Vec<i64>, ParamError> {
         let expected = "a list of integers ([1, 2])";
         let list = |value: &ParamValue| list(value, ParamValue::as_i64);
         self.read(name, default.to_vec(), expected, list, ParamValue::I64Array)
     }
 
-    /// A list of floats, none NaN; integers count, with a line in the log.
+    /// Reads a list of floats other than NaN; integers are converted and logged.
     pub fn f64_array(&self, name: &str, default: &[f64]) -> Result<Vec<f64>, ParamError> {
         let expected = "a list of floats ([1.0, 2.0])";
         let list = |value: &ParamValue| list(value, |item| self.float(name, item));
         self.read(name, default.to_vec(), expected, list, ParamValue::F64Array)
     }
 
-    /// A list of texts.
+    /// Reads a list of texts.
     pub fn string_array(&self, name: &str, default: &[&str]) -> Result<Vec<String>, ParamError> {
         let expected = "a list of texts ([\"a\", \"b\"])";
         let list = |value: &ParamValue| list(value, |item| item.as_str().map(str::to_owned));
@@ -210,7 +210,7 @@ impl Params {
     fn float(&self, name: &str, value: &ParamValue) -> Option<f64> {
         if matches!(value, ParamValue::I64(_)) {
             let node = &self.node;
-            log::info!("parameter `{name}` of {node}: the integer {value} is taken as a float");
+            log::info!("parameter `{name}` of {node}: integer {value} converted to a float");
         }
         value.as_f64().filter(|value| !value.is_nan())
     }
@@ -249,7 +249,7 @@ impl Params {
         &self.node
     }
 
-    /// True if the node has read the parameter.
+    /// True if the parameter is declared.
     pub fn has(&self, name: &str) -> bool {
         lock(&self.state).declared.contains_key(name)
     }
@@ -259,7 +259,7 @@ impl Params {
         lock(&self.state).given.contains_key(name)
     }
 
-    /// An error for a value of the right type that cannot be used.
+    /// Error for an invalid value of the declared type.
     pub fn invalid(&self, name: &str, problem: impl Into<String>) -> ParamError {
         let state = lock(&self.state);
         let given = state.given.get(name);
@@ -275,7 +275,7 @@ impl Params {
         }
     }
 
-    /// Parameters given and never read by the node, sorted.
+    /// Parameters that are given but not declared, sorted.
     pub fn unused(&self) -> Vec<String> {
         let State {
             given, declared, ..
@@ -285,7 +285,7 @@ impl Params {
         unused.cloned().collect()
     }
 
-    /// Parameters the node has read, with the values in use.
+    /// Declared parameters with their current values.
     pub fn declared(&self) -> BTreeMap<String, ParamValue> {
         let state = lock(&self.state);
         let all = state.declared.iter();
@@ -293,18 +293,18 @@ impl Params {
             .collect()
     }
 
-    /// Parameters the node has read, with all that is known of them.
+    /// Declared parameters with their descriptions.
     pub fn described(&self) -> BTreeMap<String, Declared> {
         lock(&self.state).declared.clone()
     }
 }
 
-/// A node's name without its namespace.
+/// Node name without its namespace.
 fn name_of(node_fqn: &str) -> &str {
     node_fqn.rsplit('/').next().unwrap_or(node_fqn)
 }
 
-/// A value for a message, not longer than a line or two.
+/// Value shortened for a message.
 fn brief(value: &ParamValue) -> String {
     value.to_string().chars().take(160).collect()
 }

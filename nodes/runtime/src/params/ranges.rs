@@ -1,4 +1,4 @@
-//! Readers of parameters that have a range; a value outside is refused, naming parameter and range.
+//! Readers for parameters with a range; the error of a value outside names parameter and range.
 
 use std::fmt::Debug;
 use std::ops::RangeInclusive;
@@ -7,7 +7,7 @@ use super::{Declared, ParamError, Params, Range};
 use crate::sync::lock;
 
 impl Params {
-    /// A count within `range`.
+    /// Reads a count within `range`.
     pub fn usize_in(
         &self,
         name: &str,
@@ -24,17 +24,17 @@ impl Params {
             .ok_or_else(|| self.outside(name, &range, *range.end() == usize::MAX))
     }
 
-    /// A count from 0 on.
+    /// Reads a count of 0 or more.
     pub fn usize(&self, name: &str, default: usize) -> Result<usize, ParamError> {
         self.usize_in(name, default, 0..=usize::MAX)
     }
 
-    /// A count from 1 on.
+    /// Reads a count of 1 or more.
     pub fn positive(&self, name: &str, default: usize) -> Result<usize, ParamError> {
         self.usize_in(name, default, 1..=usize::MAX)
     }
 
-    /// A float within `range`.
+    /// Reads a float within `range`.
     pub fn f64_in(
         &self,
         name: &str,
@@ -50,13 +50,13 @@ impl Params {
         }
     }
 
-    /// A text that is one of some words, by its place; the first word is the default.
+    /// Reads one of some words and returns its index; the first word is the default.
     pub fn word(&self, name: &str, words: &[&str]) -> Result<usize, ParamError> {
         let default = words.first().copied().unwrap_or_default();
         self.word_or(name, words, default)
     }
 
-    /// The same with a default.
+    /// Reads one of some words with a given default.
     pub fn word_or(&self, name: &str, words: &[&str], default: &str) -> Result<usize, ParamError> {
         let word = self.string(name, default)?;
         let known = words.join(" or ");

@@ -1,4 +1,4 @@
-//! Nodes that parameter files and the command line name.
+//! Nodes addressed by parameter files and the command line.
 
 use std::collections::BTreeSet;
 
@@ -6,19 +6,19 @@ use super::ParamError;
 use crate::params_file::{self, NodePattern};
 use crate::ros_args::RosArgs;
 
-/// A node that a section of a file or a rule `-p node:name:=value` names.
+/// Node addressed by a section of a file or by a rule `-p node:name:=value`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Addressed {
     /// Name of the node.
     pub node: String,
-    /// The section or rule, with the file.
+    /// Section or rule, with the file.
     pub place: String,
-    /// Of a section.
+    /// Pattern of a section.
     pattern: Option<NodePattern>,
 }
 
 impl Addressed {
-    /// True if it is for the node of this full name.
+    /// True if it addresses the node of this full name.
     pub fn is_for(&self, node_fqn: &str) -> bool {
         self.pattern
             .as_ref()
@@ -26,7 +26,7 @@ impl Addressed {
     }
 }
 
-/// Every node that the arguments name, each place once.
+/// All nodes addressed by the arguments, each place once.
 pub fn addressed(args: &RosArgs) -> Result<BTreeSet<Addressed>, ParamError> {
     let mut found = BTreeSet::new();
     for path in &args.params_files {

@@ -1,41 +1,41 @@
-//! Parameters that a node is given and does not know.
+//! Parameters that are given but unknown to the node.
 //!
 //! | name | is |
 //! |---|---|
 //! | read by the node | known |
 //! | `use_sim_time` and the others of every node | known |
 //! | `qos.TOPIC.reliability`, `.durability`, `.depth` | known if the node has the topic |
-//! | `qos_overrides.*`, `diagnostic_updater.*` of rclcpp | of others: it has no effect here |
+//! | `qos_overrides.*`, `diagnostic_updater.*` of rclcpp | foreign: without effect here |
 //! | any other | unknown |
 
 use super::about::OF_EVERY_NODE;
 use super::{Given, Origin, ParamError, Params};
 use crate::sync::lock;
 
-/// Beginnings of names that rclcpp and its helpers declare in any node.
+/// Prefixes of names that rclcpp and its helpers declare in any node.
 const OF_OTHERS: [&str; 2] = ["qos_overrides.", "diagnostic_updater."];
 
-/// Longest name that is compared with others, bytes.
+/// Longest name compared with others, bytes.
 const MAX_COMPARED_BYTES: usize = 128;
 
-/// A parameter that a node is given and does not know.
+/// A parameter that is given but unknown to the node.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Unknown {
     /// Its name.
     pub name: String,
-    /// True if it is for this node by name; false: for all nodes that are given the file or the arguments.
+    /// True if it addresses this node by name; false if it addresses all nodes of the file or the arguments.
     pub named: bool,
-    /// Place in a file; none: it is from the command line.
+    /// Place in a file; `None`: the command line.
     pub place: Option<String>,
 }
 
 impl Unknown {
-    /// True for a name of rclcpp, which has no effect here and is no mistake.
+    /// True for a name of rclcpp, which has no effect here but is not a mistake.
     pub fn is_of_others(&self) -> bool {
         OF_OTHERS.iter().any(|of| self.name.starts_with(of))
     }
 
-    /// The error of it. `node` has no parameter of this name, `nearest` is one that is like it.
+    /// Error for this parameter. `node` has no parameter of this name, `nearest` is a similar one.
     pub fn error(&self, node: &str, nearest: Option<&str>, help: &str) -> ParamError {
         ParamError::Unknown {
             name: self.name.clone(),
@@ -50,13 +50,13 @@ impl Unknown {
 }
 
 impl Params {
-    /// Parameters given that the node does not know, once it has read its own. Those of topics count as known:
+    /// Given parameters unknown to the node, after it has declared its own. Those of topics count as known:
     /// see [`Params::without_topic`].
     pub fn unknown(&self) -> Vec<Unknown> {
         self.undeclared(|name| !OF_EVERY_NODE.iter().any(|about| about.is_of(name)))
     }
 
-    /// Parameters `qos.TOPIC.*` given of topics that the node does not have, once it has made its own.
+    /// Given parameters `qos.TOPIC.*` of topics that the node does not have, after it has created its endpoints.
     pub fn without_topic(&self) -> Vec<Unknown> {
         let is_of = |name: &str| OF_EVERY_NODE.iter().any(|about| about.is_of(name));
         self.undeclared(|name| name.starts_with("qos.") && is_of(name))
@@ -77,7 +77,7 @@ impl Params {
         found.map(unknown).collect()
     }
 
-    /// The parameter of the node whose name is most like this one, with the number of edits between them.
+    /// Most similar parameter name of the node, with its edit distance.
     pub fn nearest(&self, name: &str) -> Option<(String, usize)> {
         let state = lock(&self.state);
         let plain = OF_EVERY_NODE.iter().map(|about| about.name);
@@ -94,8 +94,8 @@ impl Params {
     }
 }
 
-/// The name most like this one, with the number of edits between them: two at most, or a third of its letters
-/// if that is more. A name that lacks its groups (`source` for `ins.source`) is one edit away.
+/// Most similar name with its edit distance: up to two, or up to a third of its letters if that is
+/// more. A missing group (`source` for `ins.source`) counts as one edit.
 pub fn nearest<'a>(
     name: &str,
     known: impl IntoIterator<Item = &'a str>,
@@ -113,8 +113,8 @@ pub fn nearest<'a>(
     near.min_by_key(|(_, edits)| *edits)
 }
 
-/// True if `name` is a misspelling of the node name `known`: one edit, or two of 12 letters and more, apart. One
-/// that has the whole of `known` in it (`lattice_mapper2`) names another node.
+/// True if `name` is a misspelling of the node name `known`: one edit, or two from 12 letters on. A name that
+/// contains all of `known` (`lattice_mapper2`) is another node.
 pub fn is_near(name: &str, known: &str) -> bool {
     let most = if known.len() < 12 { 1 } else { 2 };
     name != known

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use crate::param_value::{ScanError, ValueError};
 
-/// Reason why a parameter file is refused.
+/// Reason for rejecting a parameter file.
 #[derive(Debug, Error)]
 pub enum ParamFileError {
     /// The file cannot be read.
@@ -13,19 +13,19 @@ pub enum ParamFileError {
         path: PathBuf,
         source: std::io::Error,
     },
-    /// The path leads to a fifo, a directory or a device.
-    #[error("parameter file {path:?} is no regular file")]
+    /// The path is a fifo, a directory or a device.
+    #[error("parameter file {path:?} is not a regular file")]
     NotAFile { path: PathBuf },
-    /// The file is larger than any parameter file should be.
+    /// The file exceeds the size limit.
     #[error("parameter file {path:?} is larger than {bytes_max} bytes")]
     TooLarge { path: PathBuf, bytes_max: u64 },
-    /// The file is no YAML, or has a key twice.
+    /// Invalid YAML, or a duplicate key.
     #[error("parameter file {path:?}: {message}")]
     Yaml { path: PathBuf, message: String },
-    /// The file has an anchor, an alias, or too deep nesting.
+    /// The file has an anchor, an alias, or excessive nesting.
     #[error("parameter file {path:?}, {source}")]
     Scan { path: PathBuf, source: ScanError },
-    /// The file is YAML of another shape.
+    /// The YAML has another structure.
     #[error("parameter file {path:?}, at `{key}`: found {found}, expected {expected}")]
     Shape {
         path: PathBuf,
@@ -33,7 +33,7 @@ pub enum ParamFileError {
         expected: &'static str,
         found: String,
     },
-    /// The file has a value of no parameter type.
+    /// A value has no parameter type.
     #[error("parameter file {path:?}, at `{key}`: {source}")]
     Value {
         path: PathBuf,

@@ -1,6 +1,6 @@
 //! Parameter files: `node: ros__parameters: name: value`, by the rules of rcl_yaml_param_parser.
 //!
-//! Stricter than rcl in one point: a key given twice is refused and does not override.
+//! Stricter than rcl in one point: a duplicate key is an error.
 
 mod error;
 mod pattern;
@@ -12,9 +12,9 @@ use crate::param_value::{ParamValue, scan};
 use serde_yaml::{Mapping, Value};
 use std::{collections::HashSet, fs::File, io::Read, path::Path};
 
-/// Longest parameter file, bytes.
+/// Largest parameter file, bytes.
 const FILE_BYTES_MAX: u64 = 1 << 20;
-/// Most levels of maps above or below `ros__parameters`.
+/// Limit of map levels above or below `ros__parameters`.
 const DEPTH_MAX: usize = 16;
 
 const PARAMETERS: &str = "ros__parameters";
@@ -22,13 +22,13 @@ const PARAMETERS: &str = "ros__parameters";
 /// One parameter of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileParam {
-    /// The nodes it is for.
+    /// Nodes it addresses.
     pub nodes: NodePattern,
-    /// Its name, levels separated by dots.
+    /// Name, levels separated by dots.
     pub name: String,
     /// Its value.
     pub value: ParamValue,
-    /// Keys that lead to it in the file.
+    /// Path of keys in the file.
     pub key: String,
 }
 
@@ -38,7 +38,7 @@ pub fn read(path: &Path) -> Result<Vec<FileParam>, ParamFileError> {
         path: path.to_owned(),
         source,
     };
-    // To open a fifo would wait for a writer.
+    // Opening a fifo would wait for a writer.
     if !std::fs::metadata(path).map_err(failed)?.is_file() {
         return Err(ParamFileError::NotAFile {
             path: path.to_owned(),
@@ -58,11 +58,11 @@ pub fn read(path: &Path) -> Result<Vec<FileParam>, ParamFileError> {
         path: path.to_owned(),
         message: error.utf8_error().to_string(),
     })?;
-    // Some editors put a byte order mark before a text.
+    // Some editors write a byte order mark first.
     parse(text.strip_prefix('\u{feff}').unwrap_or(&text), path)
 }
 
-/// Reads the text of a parameter file; `path` is for messages.
+/// Parses the text of a parameter file; `path` is for messages.
 fn parse(text: &str, path: &Path) -> Result<Vec<FileParam>, ParamFileError> {
     scan(text).map_err(|source| ParamFileError::Scan {
         path: path.to_owned(),
@@ -81,7 +81,7 @@ fn parse(text: &str, path: &Path) -> Result<Vec<FileParam>, ParamFileError> {
     Ok(reader.params)
 }
 
-/// Walks the file with the keys that lead to where it is.
+/// Traversal of the file, with the keys of the current position.
 struct Reader<'a> {
     path: &'a Path,
     keys: Vec<String>,
@@ -89,7 +89,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// A map of nodes and namespaces below `prefix`.
+    /// Reads a map of nodes and namespaces below `prefix`.
     fn nodes(&mut self, value: Value, prefix: &str) -> Result<(), ParamFileError> {
         const EXPECTED: &str = "a map of nodes, each with `ros__parameters` below it";
         let map = match value {
@@ -117,7 +117,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// A map of parameters and of maps of parameters.
+    /// Reads a map of parameters and of nested maps.
     fn parameters(
         &mut self,
         value: Value,
@@ -164,7 +164,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Steps below a key, which is a text or counts as one.
+    /// Enters a key, which is a text or converts to one.
     fn enter(&mut self, key: Value) -> Result<String, ParamFileError> {
         let key = match key {
             Value::String(key) if !key.is_empty() => key,
@@ -174,7 +174,7 @@ impl Reader<'_> {
         };
         self.keys.push(key.clone());
         if self.keys.len() > DEPTH_MAX {
-            return Err(self.shape("at most 16 levels", "one more".to_owned()));
+            return Err(self.shape("at most 16 levels", "17 levels".to_owned()));
         }
         Ok(key)
     }

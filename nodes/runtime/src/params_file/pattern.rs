@@ -1,8 +1,8 @@
 use crate::names::is_identifier;
 
-/// The nodes a section of a parameter file is for, for example `/**` or `/robot/*/mapper`.
+/// Node pattern of a section of a parameter file, for example `/**` or `/robot/*/mapper`.
 ///
-/// `*` stands for one part of a node's full name, `**` for any number of them.
+/// `*` matches one part of a node's full name, `**` any number of parts.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct NodePattern {
     parts: Vec<Part>,
@@ -16,7 +16,7 @@ enum Part {
 }
 
 impl NodePattern {
-    /// Reads a pattern; without a `/` in front it is below the root all the same.
+    /// Parses a pattern; one without a leading `/` is relative to the root.
     pub fn parse(text: &str) -> Result<NodePattern, &'static str> {
         let parts = text.strip_prefix('/').unwrap_or(text);
         if parts.is_empty() {
@@ -34,7 +34,7 @@ impl NodePattern {
         })
     }
 
-    /// The node name that is the last part of the pattern; none where that is a wildcard.
+    /// Node name in the last part of the pattern; `None` for a wildcard.
     pub fn name(&self) -> Option<&str> {
         match self.parts.last() {
             Some(Part::Name(name)) => Some(name),
@@ -42,18 +42,18 @@ impl NodePattern {
         }
     }
 
-    /// True if the last part of the pattern is this node name itself, not a wildcard.
+    /// True if the last part of the pattern is exactly this node name.
     pub fn names(&self, node_name: &str) -> bool {
         self.name() == Some(node_name)
     }
 
-    /// True if the pattern covers the node of this full name.
+    /// True if the pattern matches the node of this full name.
     pub fn matches(&self, node_fqn: &str) -> bool {
         let name: Vec<&str> = node_fqn
             .split('/')
             .filter(|part| !part.is_empty())
             .collect();
-        // reached[i]: the parts so far can cover the first i parts of the name.
+        // reached[i]: the parts so far can match the first i parts of the name.
         let mut reached: Vec<bool> = (0..=name.len()).map(|i| i == 0).collect();
         for part in &self.parts {
             let covers = |name: &str| match part {

@@ -81,7 +81,7 @@ const WRONG: &str = r#"
     a//b: {ros__parameters: {}}   | `a//b.ros__parameters`, empty part, a node name
     a: {ros__parameters: };---;b: | more than one document
     = 5                           | `m.ros__parameters`, a number, a map of parameters
-    = {a: }                       | `m.ros__parameters.a`, no value, ''
+    = {a: }                       | `m.ros__parameters.a`, value is missing, ''
     = {a: [1, b]}                 | `m.ros__parameters.a`, an integer, a text
     = {a: [[1]]}                  | `m.ros__parameters.a`, a list in a list, expected
     = {a: [{b: 1}]}               | `m.ros__parameters.a`, a map, expected

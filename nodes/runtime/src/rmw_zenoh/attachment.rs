@@ -1,4 +1,4 @@
-//! Attachments: sequence number, time and gid of the sender, in 33 bytes.
+//! Attachments (33 bytes): sequence number, time and gid of the sender.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -6,13 +6,13 @@ use zenoh::bytes::ZBytes;
 
 use crate::port::{EndpointId, SampleId};
 
-/// Eight bytes each of number and time, the length of the gid, the gid.
+/// Length: eight bytes each for number and time, the length of the gid, the gid.
 const BYTES: usize = 33;
 
-/// Length of a gid, as the serializer of zenoh-ext writes it.
+/// Length of a gid, as serialized by zenoh-ext.
 const GID_LENGTH: u8 = 16;
 
-/// Attachment of a sample that is sent now.
+/// Attachment of a sample sent now.
 pub(super) fn attachment(sample: SampleId) -> ZBytes {
     let now = SystemTime::now().duration_since(UNIX_EPOCH);
     let now_ns = now.map_or(0, |now| i64::try_from(now.as_nanos()).unwrap_or(i64::MAX));
@@ -31,10 +31,10 @@ fn write(sample: SampleId, time_ns: i64) -> [u8; BYTES] {
     bytes
 }
 
-/// Sender and number of a sample. The error is a text without them.
+/// Sender and sequence number of a sample. The error describes a missing or invalid attachment.
 pub(super) fn read(attachment: Option<&ZBytes>) -> Result<SampleId, String> {
     let attachment = attachment.ok_or("has no attachment of rmw_zenoh")?;
-    // Not gathered before its length is known.
+    // The length is checked before the fragments are merged.
     match attachment.len() == BYTES {
         true => parse(&attachment.to_bytes()),
         false => None,

@@ -1,4 +1,4 @@
-//! Configuration of the session, from the variables of rmw_zenoh.
+//! Session configuration, from the variables of rmw_zenoh.
 
 use std::path::Path;
 use std::time::Duration;
@@ -11,11 +11,11 @@ use crate::env::{
     ZENOH_SESSION_CONFIG as SESSION_CONFIG,
 };
 
-/// Between two looks for a router.
+/// Period of router checks.
 pub(super) const CHECK_PERIOD: Duration = Duration::from_secs(1);
 
-/// Differences of rmw_zenoh's default session from that of Zenoh: a peer beside a router on this machine, which
-/// tells it of the others; no multicast; time for many nodes that start at once.
+/// Differences of rmw_zenoh's default session from Zenoh's: a peer that learns of others from a router on this
+/// machine; no multicast; timeouts for many nodes starting at once.
 const DEFAULT: &str = r#"{
     mode: "peer",
     connect: { endpoints: ["tcp/localhost:7447"] },
@@ -43,17 +43,17 @@ const DEFAULT: &str = r#"{
     },
 }"#;
 
-/// Looks for a router, and what follows if there is none.
+/// Policy of the router check at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum RouterCheck {
-    /// So many, then the session goes on without.
+    /// This many checks, then the session continues without a router.
     Attempts(u64),
-    /// Until one is there.
+    /// Checks until a router is found.
     Endless,
     Skipped,
 }
 
-/// Configuration that the network asks for.
+/// Configuration for the network settings.
 pub(super) fn config(network: &Network) -> Result<(Config, RouterCheck), String> {
     let given = &network.zenoh;
     let mut config = match &given.session_config {
@@ -82,14 +82,14 @@ pub(super) fn config(network: &Network) -> Result<(Config, RouterCheck), String>
         Some(text) => match text.trim().parse::<i64>() {
             Ok(0) => RouterCheck::Endless,
             Ok(count) => u64::try_from(count).map_or(RouterCheck::Skipped, RouterCheck::Attempts),
-            Err(_) => return Err(format!("{CHECK_ATTEMPTS}={text:?} is not a whole number")),
+            Err(_) => return Err(format!("{CHECK_ATTEMPTS}={text:?} is not an integer")),
         },
     };
     Ok((config, check))
 }
 
 fn from_file(path: &str) -> Result<Config, String> {
-    // Zenoh cannot do with other names.
+    // Zenoh selects the format by the extension.
     let ending = Path::new(path)
         .extension()
         .and_then(|ending| ending.to_str());
@@ -110,12 +110,12 @@ fn insert(config: &mut Config, pair: &str) -> Result<(), String> {
     inserted.map_err(|error| format!("{OVERRIDE}: {}: {}", pair.trim(), words(error)))
 }
 
-/// Lines for the log: settings of DDS that do not hold here.
+/// Warnings about DDS settings without effect on Zenoh.
 pub(super) fn warnings(network: &Network) -> Vec<&'static str> {
     let mut warnings = Vec::new();
     if network.localhost_only && !network.discovery_off {
         warnings.push(
-            "ROS_AUTOMATIC_DISCOVERY_RANGE and ROS_LOCALHOST_ONLY do not hold on Zenoh: its router decides \
+            "ROS_AUTOMATIC_DISCOVERY_RANGE and ROS_LOCALHOST_ONLY have no effect on Zenoh: its router decides \
              what leaves this machine",
         );
     }

@@ -1,4 +1,4 @@
-//! Endpoints of other sessions by their tokens, and their matches with ours.
+//! Endpoints of other sessions, from their liveliness tokens, and their matches with local endpoints.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,13 +13,13 @@ use crate::port::{EndpointId, PortEvent};
 use crate::remote::{GraphRole, RemotePublisher};
 use crate::sync::lock;
 
-/// Endpoints of other sessions that are remembered, at most.
+/// Limit of stored endpoints of other sessions.
 const MAX_TOKENS: usize = 8192;
 
-/// Between two warnings of tokens that are refused.
+/// Period of warnings about rejected tokens.
 const WARNING_PERIOD: Duration = Duration::from_secs(5);
 
-/// All endpoints that are known.
+/// All known endpoints.
 pub(super) struct Graph {
     zid: String,
     events: Sender<PortEvent>,
@@ -34,7 +34,7 @@ struct State {
     refused: u64,
 }
 
-/// An endpoint of ours among all; dropping it takes it out.
+/// Graph entry of a local endpoint; dropping it removes the entry.
 pub(super) struct Place {
     graph: Arc<Graph>,
     id: EndpointId,
@@ -61,7 +61,7 @@ impl Graph {
         lock(&self.state).ours.contains_key(id)
     }
 
-    /// Adds an endpoint of ours, which is matched with those that are there and with those to come.
+    /// Adds a local endpoint and matches it with present and future endpoints.
     pub(super) fn add(self: &Arc<Self>, id: EndpointId, kind: Kind, channel: &Channel) -> Place {
         let mut state = lock(&self.state);
         for (peer, token) in &state.others {
@@ -88,7 +88,7 @@ impl Graph {
         }
         if state.others.len() >= MAX_TOKENS {
             drop(state);
-            return self.refuse(key, "too many endpoints are known");
+            return self.refuse(key, "more than 8192 endpoints are known");
         }
         self.found(peer, &token);
         for (id, (kind, channel)) in &state.ours {
@@ -112,7 +112,7 @@ impl Graph {
         drop(state);
         if self.warning.check().is_some() {
             let key: String = key.chars().take(200).collect();
-            log::warn!("a liveliness token is refused ({refused} so far): {why}: {key:?}");
+            log::warn!("liveliness token rejected ({refused} so far): {why}: {key:?}");
         }
     }
 
@@ -165,12 +165,12 @@ impl Graph {
     }
 
     fn send(&self, event: PortEvent) {
-        // Nobody listens after the end.
+        // The receiver may be gone at shutdown.
         let _ = self.events.try_send(event);
     }
 }
 
-/// Difference in the types of two endpoints, which have other keys then.
+/// Type mismatch of two endpoints, which then have different keys.
 fn conflict(ours: &Channel, other: &Channel) -> Option<String> {
     let shown = |text: &str| text.chars().take(200).collect::<String>();
     if ours.dds_type != other.dds_type {
@@ -181,7 +181,7 @@ fn conflict(ours: &Channel, other: &Channel) -> Option<String> {
     let hash = other.hash.as_deref().unwrap_or_default();
     match hash {
         _ if hash == ours => None,
-        // It takes any.
+        // Any hash matches.
         ANY_HASH => None,
         _ => Some(format!(
             "type of the same name in another version, {}, not {ours}",

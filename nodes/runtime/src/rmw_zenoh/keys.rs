@@ -6,13 +6,13 @@ use crate::names;
 use crate::port::{EndpointId, PortNode};
 use crate::qos::{Durability, Qos, Reliability};
 
-/// First part of every token.
+/// Prefix of every token.
 const ADMIN: &str = "@ros2_lv";
 
-/// Longest token that is read, bytes: three names of 512 bytes, a type, and what is short.
+/// Longest accepted token, bytes: three names of 512 bytes, a type, and short fields.
 const MAX_TOKEN_BYTES: usize = 4096;
 
-/// Hash in the token of a subscription that takes every version of its type.
+/// Hash in the token of a subscription that accepts every version of its type.
 pub(super) const ANY_HASH: &str = "AnyTypeHash";
 
 /// Kind of an endpoint.
@@ -37,7 +37,7 @@ impl Kind {
         found.map_or("", |(code, _)| code)
     }
 
-    /// The kind at the other end.
+    /// Kind of the matching end.
     pub(super) fn counterpart(self) -> Kind {
         match self {
             Kind::Publisher => Kind::Subscription,
@@ -53,9 +53,9 @@ impl Kind {
 pub(super) struct Channel {
     /// Full name.
     pub name: String,
-    /// Type in the form of DDS, such as `sensor_msgs::msg::dds_::Imu_`.
+    /// Type in DDS form, such as `sensor_msgs::msg::dds_::Imu_`.
     pub dds_type: String,
-    /// `RIHS01_...`; none: any.
+    /// Type hash `RIHS01_...`; `None`: any.
     pub hash: Option<String>,
 }
 
@@ -67,7 +67,7 @@ impl Channel {
     }
 }
 
-/// Session of this process, as tokens name it.
+/// Session of this process as encoded in tokens.
 #[derive(Clone, Debug)]
 pub(super) struct Session {
     pub domain: u16,
@@ -76,7 +76,7 @@ pub(super) struct Session {
 }
 
 impl Session {
-    /// Key expression of the tokens of all sessions of the domain.
+    /// Key expression that matches the tokens of all sessions of the domain.
     pub(super) fn all_tokens(&self) -> String {
         format!("{ADMIN}/{}/**", self.domain)
     }
@@ -86,7 +86,7 @@ impl Session {
         self.token(node, &node.number.to_string(), "NN")
     }
 
-    /// Token of an endpoint, which has this number in the session.
+    /// Token of an endpoint with this number in the session.
     pub(super) fn endpoint_token(
         &self,
         node: &PortNode,
@@ -118,7 +118,7 @@ impl Session {
     }
 }
 
-/// Gid of an endpoint by its token.
+/// Gid of an endpoint, derived from its token.
 pub(super) fn gid(token: &str) -> EndpointId {
     EndpointId(XxHash3_128::oneshot(token.as_bytes()).to_le_bytes())
 }
@@ -135,7 +135,7 @@ pub(super) struct Token {
     pub durability: Durability,
 }
 
-/// Reads the token of an endpoint. `Ok(None)`: that of a node. The error is a token that is none.
+/// Parses the token of an endpoint. `Ok(None)`: a node token. The error describes an invalid token.
 pub(super) fn read_token(key: &str) -> Result<Option<Token>, &'static str> {
     if key.len() > MAX_TOKEN_BYTES {
         return Err("too long");
@@ -161,7 +161,7 @@ pub(super) fn read_token(key: &str) -> Result<Option<Token>, &'static str> {
     };
     let numbers = [node_number, number];
     if numbers.iter().any(|text| text.parse::<u64>().is_err()) {
-        return Err("a number is none");
+        return Err("a number is malformed");
     }
     if *code == "NN" {
         return Ok(None);
@@ -169,7 +169,7 @@ pub(super) fn read_token(key: &str) -> Result<Option<Token>, &'static str> {
     let Some((_, kind)) = Kind::ALL.iter().find(|(known, _)| known == code) else {
         return Err("unknown kind");
     };
-    // What follows is of rmw_zenoh alone: buffers of other devices.
+    // Further parts are specific to rmw_zenoh: buffers of other devices.
     let [name, dds_type, hash, qos, ..] = rest else {
         return Err("too short");
     };
@@ -188,7 +188,7 @@ pub(super) fn read_token(key: &str) -> Result<Option<Token>, &'static str> {
     }))
 }
 
-/// A part of a token has no slash and is not empty.
+/// Mangles a name: a part of a token has no slash and is not empty.
 fn mangle(name: &str) -> String {
     match name {
         "" => "%".to_owned(),
@@ -200,8 +200,8 @@ fn demangle(part: &str) -> String {
     part.replace('%', "/")
 }
 
-/// Reliability, durability, history and depth, deadline, lifespan, liveliness; empty as far as they are the
-/// default of rmw_zenoh: reliable, volatile, keep last.
+/// Reliability, durability, history and depth, deadline, lifespan, liveliness; a field with the default of
+/// rmw_zenoh (reliable, volatile, keep last) is empty.
 fn qos_text(qos: &Qos) -> String {
     let reliability = match qos.reliability {
         Reliability::Reliable => "",
@@ -216,7 +216,7 @@ fn qos_text(qos: &Qos) -> String {
 
 fn read_qos(text: &str) -> Option<(Reliability, Durability)> {
     let mut parts = text.split(':');
-    // By the numbers of rmw; 0 is the default of the system.
+    // Numbers of rmw; 0 is the system default.
     let reliability = match parts.next()? {
         "" | "0" | "1" => Reliability::Reliable,
         "2" => Reliability::BestEffort,
@@ -227,7 +227,7 @@ fn read_qos(text: &str) -> Option<(Reliability, Durability)> {
         "" | "0" | "2" => Durability::Volatile,
         _ => return None,
     };
-    // History, deadline, lifespan and liveliness must be there.
+    // History, deadline, lifespan and liveliness must be present.
     (parts.count() >= 4).then_some((reliability, durability))
 }
 

@@ -1,7 +1,7 @@
-//! The transport over Zenoh, by the conventions of rmw_zenoh_cpp.
+//! Transport over Zenoh, by the conventions of rmw_zenoh_cpp.
 //!
-//! A topic is a key expression, a service a queryable. Every node and endpoint declares a liveliness token, whose
-//! key describes it; samples, requests and replies carry an attachment that names their sender.
+//! A topic is a key expression, a service a queryable. Every node and endpoint declares a liveliness token whose
+//! key describes it. Samples, requests and replies carry an attachment with their sender.
 
 mod attachment;
 mod config;

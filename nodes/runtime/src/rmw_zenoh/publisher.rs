@@ -1,4 +1,4 @@
-//! Publishers: threads that may block on a full link send samples in order.
+//! Publishers: samples are sent in order, on threads that may block on a full link.
 
 use std::sync::Arc;
 use std::sync::Mutex;
@@ -25,7 +25,7 @@ use crate::sync::lock;
 /// Encapsulation header of little-endian CDR.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 
-/// Heartbeat period, by which subscribers detect lost samples; the value of rmw_zenoh.
+/// Heartbeat period, which lets subscribers detect lost samples; the value of rmw_zenoh.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 
 /// A publisher with or without a cache for late joiners.
@@ -43,13 +43,13 @@ impl Sender {
     }
 }
 
-/// Writes samples of one topic.
+/// Writer of one topic.
 pub(super) struct ZenohPublisher {
     id: EndpointId,
     sender: Arc<Sender>,
     next: AtomicI64,
     queue: InTurn,
-    // In this order: the token goes before the publisher.
+    // Field order is drop order: the token before the publisher.
     _token: LivelinessToken,
     _place: Place,
 }
@@ -61,7 +61,7 @@ impl ZenohPublisher {
         qos: &Qos,
         announce: impl FnOnce() -> zenoh::Result<(LivelinessToken, Place)>,
     ) -> zenoh::Result<Self> {
-        // Local subscriptions get theirs without the network.
+        // Local subscriptions are served without the network.
         let builder = session
             .declare_publisher(key)
             .allowed_destination(Locality::Remote)
@@ -100,7 +100,7 @@ pub(super) fn congestion_control(qos: &Qos) -> CongestionControl {
     }
 }
 
-/// A body behind its encapsulation header, without a copy.
+/// Payload of a body after its encapsulation header, without a copy.
 pub(super) fn payload(body: Bytes) -> ZBytes {
     let mut payload = ZBytes::writer();
     payload.append(ZBytes::from(LITTLE_ENDIAN.to_vec()));
@@ -133,15 +133,15 @@ impl SampleWriter for ZenohPublisher {
 #[derive(Default)]
 pub(super) struct InTurn(Mutex<Option<Running>>);
 
-/// A sample that is handed over.
+/// A sample being sent.
 struct Running {
     body: Bytes,
     task: Task<zenoh::Result<()>>,
 }
 
 impl InTurn {
-    /// Hands over a body by what `prepare` makes of it. A future that is dropped does not end what it began: the
-    /// same body again waits for that.
+    /// Sends a body with the operation that `prepare` creates. Dropping the future does not cancel the operation:
+    /// a retry with the same body waits for it.
     pub(super) fn write<'a, F>(
         &'a self,
         body: Bytes,
@@ -155,7 +155,7 @@ impl InTurn {
                 (running.body.as_ptr(), running.body.len()) == (body.as_ptr(), body.len())
             });
             if !is_again {
-                // Its own fate is not that of this sample.
+                // The result of the earlier sample is not that of this one.
                 let _ = self.finished().await;
                 let task = smol::unblock(prepare(body.clone()));
                 *lock(&self.0) = Some(Running { body, task });
@@ -165,7 +165,7 @@ impl InTurn {
         })
     }
 
-    /// Completes when nothing is under way.
+    /// Completes when no sample is being sent.
     async fn finished(&self) -> zenoh::Result<()> {
         std::future::poll_fn(|context| {
             let mut running = lock(&self.0);
@@ -179,7 +179,7 @@ impl InTurn {
         .await
     }
 
-    /// Waits until nothing is under way. False: not in time.
+    /// Waits until no sample is being sent. False: timeout.
     pub(super) fn wait(&self, patience: Duration) -> bool {
         let finished = std::pin::pin!(self.finished());
         let end = Instant::now().checked_add(patience);

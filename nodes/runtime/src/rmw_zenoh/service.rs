@@ -21,16 +21,16 @@ use crate::port::{
 };
 use crate::sync::lock;
 
-/// Longest time that a server has to answer, that of rmw_zenoh; callers have their own.
+/// Timeout of a query, as in rmw_zenoh; callers have their own timeout.
 const QUERY_TIMEOUT: Duration = Duration::from_secs(600);
 
-/// Requests that wait for their replies, at most; of more, the oldest are given up.
+/// Limit of requests without reply; beyond it the oldest are dropped.
 const MAX_PENDING: usize = 4096;
 
 /// Liveliness token and graph entry of an endpoint.
 type Announced = (LivelinessToken, Place);
 
-/// A server of a key.
+/// Server of a key.
 struct Server {
     id: EndpointId,
     key: String,
@@ -40,14 +40,14 @@ struct Server {
     _queryable: Queryable<()>,
 }
 
-/// Queries whose reply is still to come.
+/// Queries without reply so far.
 #[derive(Default)]
 struct Pending {
     queries: Mutex<VecDeque<(SampleId, Query)>>,
 }
 
 impl Pending {
-    /// Keeps a query. True: another gave way to it.
+    /// Adds a query. True: an older one was dropped for it.
     fn add(&self, request: SampleId, query: Query) -> bool {
         let mut queries = lock(&self.queries);
         let full = queries.len() >= MAX_PENDING;
@@ -65,12 +65,12 @@ impl Pending {
     }
 }
 
-/// Identity of the second end of an endpoint that has one token.
+/// Identity of the second end of an endpoint with one token.
 fn other_end(id: EndpointId) -> EndpointId {
     EndpointId(id.0.map(|byte| !byte))
 }
 
-/// Both ends of a server.
+/// Creates both ends of a server.
 pub(super) fn serve(
     session: &zenoh::Session,
     (id, key): (EndpointId, String),
@@ -82,7 +82,7 @@ pub(super) fn serve(
     let (to, asked) = (Arc::clone(&inbox), Arc::clone(&pending));
     let queryable = session
         .declare_queryable(&key)
-        // It answers whatever is asked of its key.
+        // The server handles every key that matches its own.
         .complete(true)
         .allowed_origin(Locality::Remote)
         .callback(move |query| ask(query, &to, &asked))
@@ -150,7 +150,7 @@ impl SampleWriter for Replies {
     }
 }
 
-/// A client of a key.
+/// Client of a key.
 struct Client {
     id: EndpointId,
     session: zenoh::Session,
@@ -160,7 +160,7 @@ struct Client {
     _announced: Announced,
 }
 
-/// Both ends of a client.
+/// Creates both ends of a client.
 pub(super) fn call(
     session: &zenoh::Session,
     (id, key): (EndpointId, String),
@@ -206,7 +206,7 @@ impl SampleWriter for Calls {
                 number: related.map_or(0, |request| request.number),
             };
             let to = Arc::clone(&client.inbox);
-            // An error of Zenoh is no answer; the call ends by time.
+            // A Zenoh error is not a reply; the call ends by timeout.
             let hear = move |reply: zenoh::query::Reply| {
                 if let Ok(sample) = reply.into_result() {
                     let origin = Origin {

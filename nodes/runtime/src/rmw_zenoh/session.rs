@@ -1,4 +1,4 @@
-//! The session of the process, and the endpoints made in it.
+//! The Zenoh session of the process and its endpoints.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
@@ -32,7 +32,7 @@ use crate::sync::lock;
 
 /// The Zenoh session of a process.
 pub(crate) struct Zenoh {
-    // In this order: tokens go while the session is open.
+    // Field order is drop order: tokens are undeclared while the session is open.
     nodes: Mutex<Vec<LivelinessToken>>,
     _tokens: Subscriber<()>,
     graph: Arc<Graph>,
@@ -42,7 +42,7 @@ pub(crate) struct Zenoh {
     session: zenoh::Session,
 }
 
-/// An endpoint to be made.
+/// Endpoint to be created.
 struct Prepared {
     id: EndpointId,
     token: String,
@@ -51,13 +51,13 @@ struct Prepared {
 }
 
 impl Zenoh {
-    /// Opens the session that the environment asks for, and waits for a router as it says.
+    /// Opens the session for the network settings, and waits for a router as configured.
     pub(crate) fn open(network: &Network, enclave: &Enclave) -> Result<Self, RuntimeError> {
         let failed = |reason: String| RuntimeError::Session { reason };
         if enclave.secrets.is_some() {
             return Err(failed(
-                "ROS_SECURITY_ENABLE is true, which secures DDS alone; unset it, and let the Zenoh router of each \
-                 machine speak TLS to the others"
+                "ROS_SECURITY_ENABLE is true, which secures DDS only; unset it, and configure TLS between the Zenoh \
+                 routers of the machines"
                     .to_owned(),
             ));
         }
@@ -112,7 +112,7 @@ impl Zenoh {
         }
     }
 
-    /// Announces an endpoint once it can be used.
+    /// Announces an endpoint that is ready.
     fn announce(&self, of: &Prepared) -> zenoh::Result<(LivelinessToken, Place)> {
         let token = self.session.liveliness().declare_token(&of.token).wait()?;
         Ok((token, self.graph.add(of.id, of.kind, &of.channel)))
@@ -136,7 +136,7 @@ fn wait_for_router(session: &zenoh::Session, check: RouterCheck) {
         }
         if attempt == attempts {
             log::warn!(
-                "no Zenoh router is reached (looked for {attempts} times, ZENOH_ROUTER_CHECK_ATTEMPTS). Nodes of \
+                "no Zenoh router found ({attempts} checks, ZENOH_ROUTER_CHECK_ATTEMPTS). Nodes of \
                  other processes are not found before one runs: `ros2 run rmw_zenoh_cpp rmw_zenohd` or `zenohd`; \
                  or set ZENOH_CONFIG_OVERRIDE='scouting/multicast/enabled=true' for all nodes"
             );
@@ -165,7 +165,7 @@ fn channel(name: &str, ros_type: &str, hash: Option<&str>) -> Result<Channel, Ru
     })
 }
 
-/// The same of an endpoint whose key needs the hash of the type.
+/// Channel of an endpoint whose key requires the type hash.
 fn hashed(
     name: &str,
     ros_type: &str,
@@ -178,7 +178,7 @@ fn hashed(
         None => Err(failed(
             name,
             endpoint,
-            format!("the hash of {ros_type}, which its key on Zenoh needs, is not known"),
+            format!("the type hash of {ros_type}, required for its Zenoh key, is unknown"),
         )),
     }
 }
@@ -191,7 +191,7 @@ fn failed(name: &str, endpoint: &'static str, reason: impl ToString) -> RuntimeE
     }
 }
 
-/// Words of an error of Zenoh, without the places in its code.
+/// Text of a Zenoh error, without source locations.
 pub(super) fn words(error: impl ToString) -> String {
     let text = error.to_string();
     let words = text.split(" at /").next().unwrap_or_default();
@@ -213,7 +213,7 @@ impl Transport for Zenoh {
         Ok(())
     }
 
-    /// Zenoh waits for reliable subscribers whether the writer keeps its samples or not.
+    /// Creates a writer. Zenoh waits for reliable subscribers whether or not the writer keeps its samples.
     fn writer(
         &self,
         of: PortTopic<'_>,

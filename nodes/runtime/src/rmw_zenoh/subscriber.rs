@@ -1,4 +1,4 @@
-//! Subscriptions: a callback on a thread of Zenoh stores samples and never blocks.
+//! Subscriptions: a callback on a Zenoh thread stores samples and never blocks.
 
 use std::iter;
 use std::sync::atomic::Ordering::Relaxed;
@@ -21,13 +21,13 @@ use crate::port::{EndpointId, Origin, ReaderLosses, SampleReader};
 use crate::qos::{Durability, Qos, Reliability};
 use crate::sync::lock;
 
-/// Timeout of the query to the caches of publishers.
+/// Timeout of the query to publishers' caches.
 const HISTORY_TIMEOUT: Duration = Duration::from_secs(600);
 
-/// A received sample, or the reason for its refusal.
+/// A received sample, or the reason for its rejection.
 pub(super) type Arrival = Result<(ZBytes, Origin), String>;
 
-/// Samples that came, for the task that reads them.
+/// Received samples that wait for the reading task.
 pub(super) struct Inbox {
     arrivals: Arrivals<Arrival>,
     buffer: Mutex<Vec<u8>>,
@@ -43,13 +43,11 @@ impl Inbox {
         })
     }
 
-    /// Takes what came, or refuses it: too long a payload is not kept.
+    /// Stores a sample; the payload of an oversized one is dropped.
     pub(super) fn push(&self, payload: ZBytes, origin: Result<Origin, String>) {
         let (bytes, max) = (payload.len(), self.max_bytes);
         let arrival = match origin {
-            Ok(_) if bytes > max => Err(format!(
-                "{bytes} bytes are more than max_message_bytes = {max}"
-            )),
+            Ok(_) if bytes > max => Err(format!("{bytes} bytes exceed max_message_bytes = {max}")),
             Ok(origin) => Ok((payload, origin)),
             Err(why) => Err(format!("a sample {why}")),
         };
@@ -69,13 +67,13 @@ impl Inbox {
         })
     }
 
-    /// Samples that are not had.
+    /// Counters of lost samples.
     pub(super) fn losses(&self) -> &ReaderLosses {
         self.arrivals.losses()
     }
 }
 
-/// Reads an inbox, and holds its source.
+/// Reader of an inbox; owns its source.
 pub(super) struct InboxReader<S> {
     pub id: EndpointId,
     pub inbox: Arc<Inbox>,
@@ -84,13 +82,13 @@ pub(super) struct InboxReader<S> {
 
 /// Source of a subscription.
 pub(super) struct Subscribed {
-    // In this order: the token goes before the subscription.
+    // Field order is drop order: the token before the subscription.
     _token: LivelinessToken,
     _place: Place,
     _receiver: Receiver,
 }
 
-/// A subscription with or without what was sent before; kept to be undeclared.
+/// A subscription with or without history; kept until it is undeclared.
 #[expect(dead_code, reason = "held until it is dropped")]
 enum Receiver {
     Plain(Subscriber<()>),
@@ -98,7 +96,7 @@ enum Receiver {
 }
 
 impl InboxReader<Subscribed> {
-    /// Reads samples of one topic.
+    /// Subscribes to one topic.
     pub(super) fn subscribe(
         session: &zenoh::Session,
         (id, key): (EndpointId, String),
@@ -150,12 +148,12 @@ impl InboxReader<Subscribed> {
     }
 }
 
-/// Of a publisher, which Zenoh finds once.
+/// Handle of a publisher, which Zenoh discovers once.
 const HANDLE: u64 = 0;
 
 fn take(sample: &Sample, inbox: &Inbox, gaps: &Mutex<Gaps>, graph: &Graph) {
     let origin = match read(sample.attachment()) {
-        // A cache of this process answers too.
+        // Caches of this process reply too.
         Ok(sample) if graph.is_ours(&sample.writer) => return,
         Ok(sample) => {
             let missing = lock(gaps).note(sample.writer, HANDLE, sample.number);

@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-/// Reason why a command line is refused; its message shows the argument, what is accepted and an example.
+/// Reason for rejecting a command line; the message gives the argument, the expected form and an example.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum RosArgsError {
     /// The last argument is a flag that needs a value.
@@ -11,23 +11,23 @@ pub enum RosArgsError {
     MissingValue {
         /// The flag as given.
         flag: String,
-        /// Form of the value that has to follow it.
+        /// Expected form of its value.
         expected: &'static str,
-        /// A value that would be accepted.
+        /// Example of a valid value.
         example: &'static str,
     },
-    /// The value of a flag does not follow the grammar.
+    /// The value of a flag is malformed.
     #[error("`{flag} {argument}`: {problem}; expected {expected}, for example `{flag} {example}`")]
     Malformed {
         /// The flag as given.
         flag: String,
         /// The value as given, escaped and shortened.
         argument: String,
-        /// The problem with it.
+        /// What is wrong.
         problem: String,
-        /// Form of an accepted value.
+        /// Expected form of the value.
         expected: &'static str,
-        /// A value that would be accepted.
+        /// Example of a valid value.
         example: &'static str,
     },
 }

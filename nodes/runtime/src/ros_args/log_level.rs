@@ -5,7 +5,7 @@ use crate::names::shown;
 /// `--log-level LEVEL` or `--log-level logger:=LEVEL`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct LogLevelRule {
-    /// The logger, or all of them.
+    /// Logger; `None`: all loggers.
     pub logger: Option<String>,
     /// Its new level.
     pub level: LevelFilter,
@@ -22,7 +22,7 @@ impl std::str::FromStr for LogLevelRule {
         let known = |c: char| c.is_ascii_alphanumeric() || "_./:-".contains(c);
         let is_name = |logger: &&str| !logger.is_empty() && logger.chars().all(known);
         if let Some(logger) = logger.filter(|logger| !is_name(logger)) {
-            return Err(format!("`{}` is no logger name", shown(logger)));
+            return Err(format!("`{}` is not a valid logger name", shown(logger)));
         }
         Ok(LogLevelRule {
             logger: logger.map(str::to_owned),
@@ -31,13 +31,13 @@ impl std::str::FromStr for LogLevelRule {
     }
 }
 
-/// A severity of rcutils, in any case, as a level of ours: what ends the process is an error.
+/// Converts a severity of rcutils, in any case; fatal becomes error.
 fn level_of(text: &str) -> Result<LevelFilter, String> {
     match text.to_ascii_lowercase().as_str() {
         "debug" => Ok(LevelFilter::Debug),
         "unset" | "info" => Ok(LevelFilter::Info),
         "warn" => Ok(LevelFilter::Warn),
         "error" | "fatal" => Ok(LevelFilter::Error),
-        _ => Err(format!("`{}` is no log level", shown(text))),
+        _ => Err(format!("`{}` is not a log level", shown(text))),
     }
 }

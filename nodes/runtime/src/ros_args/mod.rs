@@ -1,4 +1,4 @@
-//! The `--ros-args` command line, by the grammar of rcl's `arguments.h`.
+//! The `--ros-args` command line, with the grammar of rcl's `arguments.h`.
 
 mod error;
 mod log_level;
@@ -16,27 +16,27 @@ use crate::names::{RemapRule, RemapTarget};
 /// A parsed command line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RosArgs {
-    /// Remap rules in the order given; the first match wins.
+    /// Remap rules in order; the first match applies.
     pub(crate) remaps: Vec<RemapRule>,
-    /// `-p name:=value` in the order given; the last one wins, and all win over files.
+    /// `-p name:=value` in order; the last one applies, and all override files.
     pub(crate) param_overrides: Vec<ParamOverride>,
-    /// `--params-file` in the order given; the last one wins.
+    /// `--params-file` in order; the last one applies.
     pub(crate) params_files: Vec<PathBuf>,
-    /// `--enclave`; the last one wins.
+    /// `--enclave`; the last one applies.
     pub(crate) enclave: Option<String>,
-    /// `--log-level` in the order given; the last one for a logger wins.
+    /// `--log-level` in order; the last one per logger applies.
     pub(crate) log_levels: Vec<LogLevelRule>,
     /// True after `--disable-stdout-logs`.
     pub(crate) no_stdout_logs: bool,
     /// True after `--disable-rosout-logs`.
     pub(crate) no_rosout_logs: bool,
-    /// First part of the name of the log file; the program's name if none.
+    /// First part of the log file's name; `None`: the program's name.
     pub log_file_name: Option<String>,
     /// True: no log file is written.
     pub no_log_file: bool,
-    /// Everything outside the ROS scopes in order, the program's name first where it was given.
+    /// Arguments outside the ROS scopes in order, with the program's name first if given.
     pub user_args: Vec<String>,
-    /// Lines for the log once it is up.
+    /// Warnings for the log, before logging is initialized.
     pub(crate) warnings: Vec<String>,
 }
 
@@ -48,12 +48,12 @@ impl RosArgs {
 
     /// Parses a command line, with or without the program's name in front.
     ///
-    /// A malformed rule fails at once; of an unknown argument inside a scope the log is warned.
+    /// A malformed rule is an error; an unknown argument inside a scope is a warning.
     pub fn parse(argv: impl IntoIterator<Item = String>) -> Result<RosArgs, RosArgsError> {
         parse::parse(argv)
     }
 
-    /// The name of a node called `default` in the code, after `__node:=` rules.
+    /// Name of a node with the default name `default`, after `__node:=` rules.
     pub fn node_name(&self, default: &str) -> String {
         let mut rules = self.rules_of(default);
         let name = rules.find_map(|target| match target {
@@ -63,9 +63,9 @@ impl RosArgs {
         name.unwrap_or(default).to_owned()
     }
 
-    /// The namespace of a node called `default` in the code, after `__ns:=` rules; `/` without one.
+    /// Namespace of a node with the default name `default`, after `__ns:=` rules; `/` without one.
     ///
-    /// As in rcl, a rule `node:__ns:=` names the node by the name it has after `__node:=`.
+    /// As in rcl, a rule `node:__ns:=` refers to the node's name after `__node:=`.
     pub fn namespace(&self, default: &str) -> String {
         let name = self.node_name(default);
         let mut rules = self.rules_of(&name);

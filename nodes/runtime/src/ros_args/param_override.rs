@@ -4,9 +4,9 @@ use crate::param_value::ParamValue;
 /// `-p [node:]name:=value`, the value read as YAML.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ParamOverride {
-    /// The only node the rule is for (by name, in any namespace), or all of them.
+    /// Node (by name, in any namespace) that the rule is restricted to; `None`: all nodes.
     pub node: Option<String>,
-    /// The parameter, levels separated by dots.
+    /// Parameter name, levels separated by dots.
     pub name: String,
     pub value: ParamValue,
 }
@@ -16,12 +16,12 @@ impl std::str::FromStr for ParamOverride {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (node, rule) = split_node(text);
-        let (name, value) = rule.split_once(":=").ok_or("there is no `:=`")?;
+        let (name, value) = rule.split_once(":=").ok_or("`:=` is missing")?;
         if !name.split('.').all(is_level) {
-            return Err(format!("`{}` is no parameter name", shown(name)));
+            return Err(format!("`{}` is not a valid parameter name", shown(name)));
         }
         let value = ParamValue::from_yaml_text(value)
-            .map_err(|error| format!("the value `{}` is refused: {error}", shown(value)))?;
+            .map_err(|error| format!("invalid value `{}`: {error}", shown(value)))?;
         Ok(ParamOverride {
             node: node.map(str::to_owned),
             name: name.to_owned(),
@@ -30,7 +30,7 @@ impl std::str::FromStr for ParamOverride {
     }
 }
 
-/// True for parts separated by slashes, of which `~/` or `/` may lead the first.
+/// True for parts separated by slashes; the first may begin with `~/` or `/`.
 fn is_level(level: &str) -> bool {
     let rooted = level.strip_prefix("~/").or(level.strip_prefix('/'));
     rooted.unwrap_or(level).split('/').all(is_identifier)

@@ -36,7 +36,7 @@ const LOG_FILE: Value = Value {
     example: "mapper",
 };
 
-/// The value that follows `flag`, parsed.
+/// Parses the value that follows `flag`.
 fn value<T>(
     rest: &mut impl Iterator<Item = String>,
     flag: &str,
@@ -105,7 +105,7 @@ fn ros_argument(
     Ok(())
 }
 
-/// Outside a scope rcl still takes a bare remap rule, and complains.
+/// Handles an argument outside the scope: rcl accepts a bare remap rule with a warning.
 fn user_argument(args: &mut RosArgs, argument: String) {
     match argument.parse::<RemapRule>() {
         Ok(rule) => {
@@ -126,7 +126,7 @@ fn unknown(argument: &str) -> String {
     } else {
         format!("; `{SCOPE_END}` ends the ROS arguments where yours begin")
     };
-    format!("`{argument}` is no ROS argument and is left alone{hint}")
+    format!("`{argument}` is not a ROS argument and is ignored{hint}")
 }
 
 fn not_empty<T: From<String>>(text: &str) -> Result<T, String> {
@@ -136,15 +136,15 @@ fn not_empty<T: From<String>>(text: &str) -> Result<T, String> {
     }
 }
 
-/// Part of the name of a file: no folder, and not hidden.
+/// Validates a log file name: no folder, and not hidden.
 fn file_name(text: &str) -> Result<String, String> {
     match text.contains('/') || text.starts_with('.') || text.len() > 128 {
-        true => Err("it is no plain name of at most 128 bytes".to_owned()),
+        true => Err("it is not a plain file name of at most 128 bytes".to_owned()),
         false => not_empty(text),
     }
 }
 
-/// rcl's rule for enclaves: the tokens of a node's full name.
+/// Validates an enclave by the rule of rcl: tokens of a node's full name.
 fn enclave(text: &str) -> Result<String, String> {
     validate_namespace(text).map_err(|error| error.to_string())?;
     Ok(text.to_owned())

@@ -226,10 +226,10 @@ fn malformed_values_fail_at_once() {
 #[test]
 fn problems_say_what_is_wrong() {
     for (rule, problem) in [
-        ("points", "there is no `:=`"),
+        ("points", "`:=` is missing"),
         ("points:=", "one side of `:=` is empty"),
         ("/**:=points", "wildcard"),
-        ("__node:=/a/b", "`/a/b` is no node name"),
+        ("__node:=/a/b", "`/a/b` is not a valid node name"),
         ("__ns:=robot", "robot"),
     ] {
         let found = rule.parse::<RemapRule>().unwrap_err();

@@ -1,5 +1,5 @@
-//! Services of this process by name: calls of its own clients do not go over DDS, which delivers nothing
-//! inside a participant.
+//! Services within the process, by name: calls of local clients bypass DDS, whose participant ignores its own
+//! endpoints.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -8,23 +8,23 @@ use smol::channel::{Receiver, Sender, bounded};
 
 use crate::sync::lock;
 
-/// Calls that wait for one server, at most.
+/// Limit of calls queued at one server.
 const MAX_WAITING: usize = 64;
 
-/// A call of a client in this process.
+/// Call of a client in this process.
 pub(crate) struct LocalCall {
     /// CDR, its encapsulation header first.
     pub request: Vec<u8>,
-    /// For the answer, CDR too, or the reason why there is none.
+    /// Receives the reply (CDR), or the reason for its absence.
     pub answered: Sender<Result<Vec<u8>, String>>,
 }
 
-/// The servers that clients here can call.
+/// Servers of this process.
 #[derive(Default)]
 pub(crate) struct LocalServices(Mutex<BTreeMap<String, (&'static str, Sender<LocalCall>)>>);
 
 impl LocalServices {
-    /// Adds a server; the last one of a name counts.
+    /// Adds a server; it replaces an earlier one of the same name.
     pub(crate) fn add(&self, name: &str, type_name: &'static str) -> Receiver<LocalCall> {
         let (sender, calls) = bounded(MAX_WAITING);
         let mut all = lock(&self.0);
@@ -33,7 +33,7 @@ impl LocalServices {
         calls
     }
 
-    /// The entrance to a server of this type, if there is one.
+    /// Call queue of a server of this type, if any.
     pub(crate) fn find(&self, name: &str, type_name: &str) -> Option<Sender<LocalCall>> {
         let all = lock(&self.0);
         let (found, sender) = all.get(name)?;

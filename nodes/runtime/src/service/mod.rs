@@ -1,12 +1,12 @@
-//! Servers of services, for clients of either rmw, and the calls of our own clients.
+//! Service servers for clients of any rmw, and calls of our own clients.
 
-mod asking;
 mod local;
+mod remote_calls;
 mod serving;
 mod wire;
 
-pub(crate) use asking::{Asking, Waiting};
 pub(crate) use local::{LocalCall, LocalServices};
+pub(crate) use remote_calls::{PendingCalls, RemoteCalls};
 pub(crate) use serving::Serving;
 
 use std::sync::atomic::AtomicU64;
@@ -21,11 +21,11 @@ use super::outbox::Outbox;
 use super::peers::Peers;
 use super::sync::{lock, wait_for};
 
-/// A server of a service; dropping it ends it.
+/// A service server; dropping it ends it.
 #[must_use = "dropping a server ends it"]
 pub struct Server {
     pub(crate) name: String,
-    /// Hear of matches.
+    /// Peers, notified of matches.
     pub(crate) _clients: Arc<Peers>,
     pub(crate) _task: Task<()>,
     pub(crate) _graph: [NodeEndpoint; 2],
@@ -38,16 +38,16 @@ impl Server {
     }
 }
 
-/// Requests of a server that came to nothing: the wire knows no refusal, so they are told here.
+/// Requests without reply: the wire protocol has no rejection, so they are counted here.
 pub(crate) struct Unanswered {
     pub name: String,
-    /// Gave way to newer ones before they were taken.
+    /// Overwritten by newer requests before they were taken.
     pub lost: AtomicU64,
-    /// Were taken, and could not be read or answered.
+    /// Taken, but not decodable or without reply.
     pub failed: AtomicU64,
 }
 
-/// Answers one request, from any thread. Of clones, the first to send counts.
+/// Replies to one request, from any thread. Of its clones, the first to send is used.
 pub struct Reply<R>(Sender<R>);
 
 impl<R> Clone for Reply<R> {
@@ -57,44 +57,44 @@ impl<R> Clone for Reply<R> {
 }
 
 impl<R> Reply<R> {
-    /// Sends the answer. A request whose reply is dropped instead is not answered.
+    /// Sends the reply. A request whose reply is dropped remains without reply.
     pub fn send(self, response: R) {
         // The server may have ended.
         let _ = self.0.try_send(response);
     }
 
-    /// A reply that goes to the receiver instead of a client.
+    /// Creates a reply that goes to a receiver instead of a client.
     pub fn channel() -> (Self, Receiver<R>) {
         let (sender, receiver) = bounded(1);
         (Self(sender), receiver)
     }
 }
 
-/// The servers of a process, for its end.
+/// Servers of a process, for its shutdown.
 #[derive(Default)]
 pub(crate) struct Answers {
     servers: Mutex<Vec<(EndOrder, Weak<Outbox>)>>,
 }
 
-/// Asks a server to end; it drops what it is sent once its answers are queued.
+/// Shutdown order for a server; it drops the received sender once its replies are queued.
 type EndOrder = Sender<Sender<()>>;
 
 impl Answers {
-    /// Adds a server that ends when asked through `end`.
+    /// Adds a server that ends on a message to `end`.
     pub(crate) fn add(&self, end: EndOrder, replies: &Arc<Outbox>) {
         let mut servers = lock(&self.servers);
         servers.retain(|(end, _)| !end.is_closed());
         servers.push((end, Arc::downgrade(replies)));
     }
 
-    /// Ends all servers once they have queued their answers to the requests they have taken; an answer
-    /// that does not come holds them up until `deadline`. Returns the writers of the answers.
+    /// Ends all servers once they have queued their replies to the requests taken so far; missing
+    /// replies delay the end until `deadline`. Returns the writers of the replies.
     pub(crate) fn end(&self, deadline: Instant) -> Vec<Arc<Outbox>> {
         let servers = std::mem::take(&mut *lock(&self.servers));
         let (done, all_done) = bounded(1);
         let mut writers = Vec::new();
         for (end, replies) in servers {
-            // Fails where the server has ended.
+            // Fails if the server has ended.
             let _ = end.try_send(done.clone());
             writers.extend(replies.upgrade());
         }

@@ -1,4 +1,4 @@
-//! The task of a server: takes requests, and sends each answer when its client can hear it.
+//! Server task: takes requests, and sends each reply once the client's reader is matched.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering::Relaxed;
@@ -22,46 +22,46 @@ use crate::port::{EndpointId, Origin, SampleReader, ServiceForm};
 use crate::qos::Qos;
 use crate::sync::lock;
 
-/// A client may ask before its reply reader is known here; a reply sent then would be lost. Fast DDS repairs a lost
-/// announcement after 3 s.
+/// Longest wait for the reply reader of a client: a reply sent before its match would be lost. Fast DDS
+/// repairs a lost announcement after 3 s.
 const WAIT_FOR_CLIENT: Duration = Duration::from_secs(5);
 
-/// Clients of which it is remembered that no reply reader came.
+/// Limit of stored clients whose reply reader never matched.
 const MAX_ABSENT: usize = 4096;
 
-/// A server at work.
+/// A running server.
 pub(crate) struct Serving {
     pub form: ServiceForm,
     pub unanswered: Arc<Unanswered>,
     pub requests: Box<dyn SampleReader>,
-    /// Those of this process.
+    /// Requests of this process.
     pub local: Receiver<LocalCall>,
     pub replies: Arc<Outbox>,
-    /// The other ends of the replies.
+    /// Peers of the reply writer.
     pub readers: Arc<Peers>,
-    /// Clients whose reply reader did not come in time. Their further requests do not wait for it, nor others
-    /// behind them.
+    /// Clients whose reply reader did not match in time. Their further requests do not wait, nor delay
+    /// others.
     pub absent: Mutex<BTreeSet<EndpointId>>,
     pub ending: Receiver<Sender<()>>,
-    /// Requests that wait for their answers at a time, at most.
+    /// Limit of requests in progress.
     pub max_pending: usize,
     pub warning: Throttle,
 }
 
-/// A request that waits for its answer.
-struct Asked<R> {
+/// A request in progress.
+struct PendingRequest<R> {
     answered: Receiver<R>,
-    client: Asker,
+    client: Requester,
 }
 
 /// Sender of a request.
-enum Asker {
+enum Requester {
     Remote { reply_to: ReplyTo, id: EndpointId },
     Local(Sender<Result<Vec<u8>, String>>),
 }
 
 /// Next event of a server.
-enum Step {
+enum ServerEvent {
     Take(Result<Origin, String>),
     TakeLocal(LocalCall),
     Answered(Result<(), String>),
@@ -69,7 +69,7 @@ enum Step {
 }
 
 impl Serving {
-    /// Serves until the task is dropped or the end is asked for and everything answered.
+    /// Serves until the task is dropped, or until shutdown with all requests replied to.
     pub(crate) async fn run<S: RosService>(
         self,
         mut handler: impl FnMut(S::Request, Reply<S::Response>),
@@ -81,7 +81,7 @@ impl Serving {
             let take = async {
                 match takes {
                     true => {
-                        let remote = async { Step::Take(self.requests.next().await) };
+                        let remote = async { ServerEvent::Take(self.requests.next().await) };
                         or(self.next_local(), remote).await
                     }
                     false => future::pending().await,
@@ -89,30 +89,30 @@ impl Serving {
             };
             let answered = async {
                 match pending.next().await {
-                    Some(result) => Step::Answered(result),
+                    Some(result) => ServerEvent::Answered(result),
                     None => future::pending().await,
                 }
             };
             let end = async {
                 match self.ending.recv().await {
-                    Ok(done) => Step::End(done),
+                    Ok(done) => ServerEvent::End(done),
                     Err(_) => future::pending().await,
                 }
             };
             let outcome = match or(end, or(answered, take)).await {
-                Step::Take(sample) => {
+                ServerEvent::Take(sample) => {
                     self.count_lost();
                     self.ask::<S>(sample, &mut handler)
                         .map(|asked| pending.push(self.answer(asked)))
                 }
-                Step::TakeLocal(call) => {
+                ServerEvent::TakeLocal(call) => {
                     pending.extend(
                         ask_locally::<S>(call, &mut handler).map(|asked| self.answer(asked)),
                     );
                     Ok(())
                 }
-                Step::Answered(result) => result,
-                Step::End(done) => {
+                ServerEvent::Answered(result) => result,
+                ServerEvent::End(done) => {
                     ended = Some(done);
                     Ok(())
                 }
@@ -125,21 +125,21 @@ impl Serving {
         }
     }
 
-    async fn next_local(&self) -> Step {
+    async fn next_local(&self) -> ServerEvent {
         match self.local.recv().await {
-            Ok(call) => Step::TakeLocal(call),
+            Ok(call) => ServerEvent::TakeLocal(call),
             // Another server has taken the name.
             Err(_) => future::pending().await,
         }
     }
 
-    /// Counts the requests that were lost since the last one.
+    /// Counts requests lost since the last one.
     fn count_lost(&self) {
         let lost = self.requests.losses().overrun.swap(0, Relaxed);
         if lost > 0 {
             self.unanswered.lost.fetch_add(lost, Relaxed);
             self.warn(&format!(
-                "{lost} requests lost: more than {} waited; ask again",
+                "{lost} requests lost: more than {} were queued; retry",
                 Qos::REQUESTS.depth
             ));
         }
@@ -155,7 +155,7 @@ impl Serving {
         &self,
         sample: Result<Origin, String>,
         handler: &mut impl FnMut(S::Request, Reply<S::Response>),
-    ) -> Result<Asked<S::Response>, String> {
+    ) -> Result<PendingRequest<S::Response>, String> {
         let origin = sample?;
         let (request, reply_to) =
             read_request::<S::Request>(self.form, &self.requests.bytes(), &origin)
@@ -163,18 +163,18 @@ impl Serving {
         let (reply, answered) = Reply::channel();
         handler(request, reply);
         let id = origin.sample.writer;
-        let client = Asker::Remote { reply_to, id };
-        Ok(Asked { answered, client })
+        let client = Requester::Remote { reply_to, id };
+        Ok(PendingRequest { answered, client })
     }
 
-    async fn answer<R: RosMessage>(&self, asked: Asked<R>) -> Result<(), String> {
+    async fn answer<R: RosMessage>(&self, asked: PendingRequest<R>) -> Result<(), String> {
         let answer = asked.answered.recv().await;
-        let reply = answer.map_err(|_| "nobody answered it".to_owned());
+        let reply = answer.map_err(|_| "no reply was sent".to_owned());
         let (reply_to, id) = match asked.client {
-            Asker::Remote { reply_to, id } => (reply_to, id),
-            Asker::Local(to) => {
+            Requester::Remote { reply_to, id } => (reply_to, id),
+            Requester::Local(to) => {
                 let written = |reply| cdr::to_vec(&reply).map_err(|e| e.to_string());
-                // It may wait no longer.
+                // The caller may have stopped waiting.
                 let _ = to.try_send(reply.and_then(written));
                 return Ok(());
             }
@@ -194,7 +194,9 @@ impl Serving {
             false => WAIT_FOR_CLIENT,
         };
         let known = async {
-            self.readers.known(|reader| reader.is_beside(client)).await;
+            self.readers
+                .known(|reader| reader.same_participant(client))
+                .await;
             true
         };
         let timeout = async {
@@ -211,17 +213,17 @@ impl Serving {
     }
 }
 
-/// Gives a call of this process to the handler; one that is no request is answered at once.
+/// Passes a local call to the handler; a malformed request is rejected at once.
 fn ask_locally<S: RosService>(
     call: LocalCall,
     handler: &mut impl FnMut(S::Request, Reply<S::Response>),
-) -> Option<Asked<S::Response>> {
-    let client = Asker::Local(call.answered.clone());
+) -> Option<PendingRequest<S::Response>> {
+    let client = Requester::Local(call.answered.clone());
     match cdr::from_slice(&call.request) {
         Ok(request) => {
             let (reply, answered) = Reply::channel();
             handler(request, reply);
-            Some(Asked { answered, client })
+            Some(PendingRequest { answered, client })
         }
         Err(error) => {
             let _ = call.answered.try_send(Err(error.to_string()));

@@ -1,35 +1,35 @@
-//! Requests and replies on the wire. On DDS each rmw has its own form, recognised by the vendor of the peer.
+//! Wire format of requests and replies. On DDS each rmw has its own, selected by the vendor id of the peer.
 //!
-//! rmw_fastrtps sends the bare message and names the request in the inline QoS (the "Enhanced" mapping
-//! of DDS-RPC 1.0); rmw_cyclonedds puts a header of 16 bytes in front of it. On Zenoh the message is bare.
+//! rmw_fastrtps sends the bare message and identifies the request in the inline QoS (the "Enhanced" mapping
+//! of DDS-RPC 1.0); rmw_cyclonedds prepends a header of 16 bytes. On Zenoh the message is bare.
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
 
 use crate::port::{Bytes, ENCAPSULATION_BYTES, EndpointId, Origin, SampleId, ServiceForm};
 
-/// First two bytes of the GUIDs of a vendor.
+/// Vendor ids: first two bytes of GUIDs.
 const CYCLONE_VENDOR: [u8; 2] = [0x01, 0x10];
 const RUSTDDS_VENDOR: [u8; 2] = [0x01, 0x12];
 const FASTDDS_VENDOR: [u8; 2] = [0x01, 0x0f];
 
-/// Set in the first byte of the GUID of a secured participant, which comes from its certificate and so
-/// names no vendor.
+/// Bit in the first byte of the GUID of a secured participant. Such a GUID is derived from its certificate and
+/// has no vendor id.
 const SECURED: u8 = 0x80;
 
-/// Eight bytes of the client's GUID and eight of the request's number.
+/// Header length: eight bytes of the client's GUID and eight of the request's number.
 const CYCLONE_HEADER_BYTES: usize = 16;
 
-/// First bytes of the header of a request of ours.
+/// First bytes of the header of our requests.
 const OURS: [u8; 4] = *b"latt";
 
-/// Last byte of the identity of a writer without keys.
+/// Entity kind (last GUID byte) of a writer without keys.
 const ENTITY_KIND_WRITER: u8 = 3;
 
-/// Identity of a request in the form of rmw_cyclonedds, which is also that of our own.
+/// Request identity in the format of rmw_cyclonedds, also used by our own.
 pub(crate) type Header = [u8; CYCLONE_HEADER_BYTES];
 
-/// Identity of a request in a reply, in the form of the client's rmw.
+/// Request identity in a reply, in the format of the client's rmw.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ReplyTo {
     Enhanced(SampleId),
@@ -42,7 +42,7 @@ enum Mapping {
     Cyclone,
 }
 
-/// Reads a request, its encapsulation header first. The error is that of the likelier mapping.
+/// Parses a request, encapsulation header first. The error is that of the more likely mapping.
 pub(crate) fn read_request<Q: RosMessage>(
     form: ServiceForm,
     bytes: &[u8],
@@ -59,7 +59,7 @@ pub(crate) fn read_request<Q: RosMessage>(
     read.or_else(|error| read_as(bytes, origin, second).map_err(|_| error))
 }
 
-/// The body of a reply, and what the inline QoS has to say.
+/// Body of a reply, and the request identity for its inline QoS.
 pub(crate) fn write_reply<R: RosMessage>(
     reply: &R,
     to: &ReplyTo,
@@ -68,12 +68,12 @@ pub(crate) fn write_reply<R: RosMessage>(
     let body = message.get(ENCAPSULATION_BYTES..).unwrap_or_default();
     Ok(match to {
         ReplyTo::Enhanced(request) => (Bytes::copy_from_slice(body), Some(*request)),
-        // The header is 16 bytes, so the alignment of what follows stays.
+        // The header has 16 bytes, so the alignment is preserved.
         ReplyTo::Cyclone(header) => ([header.as_slice(), body].concat().into(), None),
     })
 }
 
-/// Identity of a request of ours in the form of rmw_cyclonedds: [`OURS`], some of its writer, its number.
+/// Identity of one of our requests in the format of rmw_cyclonedds: [`OURS`], part of its writer, its number.
 fn header(writer: &EndpointId, number: i64) -> Header {
     let id = u128::from_le_bytes(writer.0);
     let folded = (id as u64) ^ ((id >> 64) as u64);
@@ -87,8 +87,8 @@ fn header(writer: &EndpointId, number: i64) -> Header {
     header
 }
 
-/// Identity of a request to a server over Fast DDS: one of the server's participant, so that a large
-/// request finds it. A server answers to it unseen, since it is no reader's.
+/// Identity of a request to a Fast DDS server: it belongs to the server's participant, so that the reply to a
+/// large request is accepted. The server replies without a match, since no reader has this identity.
 fn identity_there(server: &EndpointId, number: i64) -> Header {
     let [prefix @ .., _, _, _, _] = server.0;
     let [a, b, c, ..] = number.to_le_bytes();
@@ -99,32 +99,32 @@ fn identity_there(server: &EndpointId, number: i64) -> Header {
     identity
 }
 
-/// A request of ours, in the form of its server.
-pub(crate) struct Asked {
-    /// Names the request in its answer.
+/// Outgoing request in the format of its server.
+pub(crate) struct OutgoingRequest {
+    /// Identity of the request in its reply.
     pub identity: Header,
     pub body: Bytes,
-    /// Words of its inline QoS.
+    /// Identity for its inline QoS.
     pub related: Option<SampleId>,
 }
 
-/// Writes a request to a server. `None`: it is no little-endian CDR.
+/// Encodes a request to a server. `None`: it is not little-endian CDR.
 pub(crate) fn write_request(
     form: ServiceForm,
     message: &[u8],
     writer: &EndpointId,
     server: &EndpointId,
     number: i64,
-) -> Option<Asked> {
+) -> Option<OutgoingRequest> {
     let (encapsulation, body) = message.split_first_chunk::<ENCAPSULATION_BYTES>()?;
     if !encapsulation.starts_with(&[0, 1]) {
         return None;
     }
     if form == ServiceForm::Queries {
-        // Comes back as it is.
+        // The server returns it unchanged.
         let identity = header(writer, number);
         let writer = EndpointId(identity);
-        return Some(Asked {
+        return Some(OutgoingRequest {
             identity,
             body: Bytes::copy_from_slice(body),
             related: Some(SampleId { writer, number }),
@@ -133,21 +133,21 @@ pub(crate) fn write_request(
     if server.vendor() == FASTDDS_VENDOR {
         let identity = identity_there(server, number);
         let writer = EndpointId(identity);
-        return Some(Asked {
+        return Some(OutgoingRequest {
             identity,
             body: Bytes::copy_from_slice(body),
             related: Some(SampleId { writer, number: 0 }),
         });
     }
     let identity = header(writer, number);
-    Some(Asked {
+    Some(OutgoingRequest {
         identity,
         body: [identity.as_slice(), body].concat().into(),
         related: None,
     })
 }
 
-/// Identity of the request of an answer, and the answer as CDR. `None`: none that names a request.
+/// Request identity and CDR body of a reply. `None`: it identifies no request.
 pub(crate) fn read_answer(bytes: &[u8], origin: &Origin) -> Option<(Header, Vec<u8>)> {
     match origin.related {
         Some(request) => Some((request.writer.0, bytes.to_vec())),
@@ -155,7 +155,7 @@ pub(crate) fn read_answer(bytes: &[u8], origin: &Origin) -> Option<(Header, Vec<
     }
 }
 
-/// The header of an answer, and the answer as CDR. `None`: none with a header.
+/// Header and CDR body of a reply. `None`: the header is missing.
 fn read_headed(bytes: &[u8]) -> Option<(Header, Vec<u8>)> {
     let (encapsulation, rest) = bytes.split_first_chunk::<ENCAPSULATION_BYTES>()?;
     let (header, body) = rest.split_first_chunk::<CYCLONE_HEADER_BYTES>()?;
@@ -163,7 +163,7 @@ fn read_headed(bytes: &[u8]) -> Option<(Header, Vec<u8>)> {
     Some((header, [encapsulation.as_slice(), body].concat()))
 }
 
-/// A header in little-endian order.
+/// Header converted to little-endian order.
 fn in_our_order(mut header: Header, encapsulation: &[u8]) -> Header {
     if encapsulation.get(1) == Some(&0) {
         for word in header.chunks_exact_mut(8) {
@@ -178,9 +178,9 @@ fn likely_mapping(bytes: &[u8], origin: &Origin) -> Mapping {
     match origin.sample.writer.vendor() {
         CYCLONE_VENDOR => Mapping::Cyclone,
         RUSTDDS_VENDOR if is_ours => Mapping::Cyclone,
-        // ros2-client speaks both; only with the header does it name the request in a client.
+        // ros2-client uses both mappings; a related identity is only present with the header.
         RUSTDDS_VENDOR if origin.related.is_some() => Mapping::Cyclone,
-        // Clients over Fast DDS always name what to answer to.
+        // Fast DDS clients always give a related identity.
         [SECURED..=0xff, _] if origin.related.is_none() => Mapping::Cyclone,
         _ => Mapping::Enhanced,
     }
@@ -210,10 +210,10 @@ fn read_as<Q: RosMessage>(
     }
 }
 
-/// The request as the client knows it: its reply reader if it names that, else its writer.
+/// Request identity from the client's view: its reply reader if given, else its writer.
 fn identity(origin: &Origin) -> SampleId {
     match origin.related {
-        // FastDDS names the reader but leaves the number to the sample.
+        // Fast DDS gives the reader and leaves the number to the sample.
         Some(related) if related.number <= 0 => SampleId {
             writer: related.writer,
             ..origin.sample

@@ -1,4 +1,4 @@
-//! Clients of services, in this process or another.
+//! Service clients, for servers in this process or another.
 
 use std::sync::atomic::AtomicI64;
 use std::sync::{Arc, Mutex, Weak};
@@ -17,34 +17,34 @@ use crate::outbox::WhenFull;
 use crate::peers::Peers;
 use crate::port::{ClientEnds, EndpointKind, PortService, SampleReader, ServiceQos};
 use crate::qos::Qos;
-use crate::service::{Asking, LocalCall, Waiting};
+use crate::service::{LocalCall, PendingCalls, RemoteCalls};
 use crate::sync::lock;
 
-/// Answers are longer than requests.
+/// QoS of clients: replies are longer than requests.
 const QOS: ServiceQos = ServiceQos {
     reader: Qos::SERVICES,
     writer: Qos::SERVICES,
     max_bytes: 4 << 20,
 };
 
-/// Reason why a call has no answer.
+/// Reason for a call without reply.
 #[derive(Debug, Error)]
 pub enum CallError {
-    /// No server is known.
-    #[error("nobody serves {name}")]
+    /// No server is discovered.
+    #[error("no server of {name}")]
     NoServer {
         /// Full name of the service.
         name: String,
     },
-    /// The server does not answer.
-    #[error("{name} has not answered within {patience_s} s")]
+    /// The server did not reply in time.
+    #[error("{name} has not replied within {patience_s} s")]
     Late {
         /// Full name of the service.
         name: String,
-        /// Time given, s.
+        /// Timeout, s.
         patience_s: f64,
     },
-    /// It was refused, or not sent.
+    /// The call was rejected, or not sent.
     #[error("{name}: {reason}")]
     Failed {
         /// Full name of the service.
@@ -54,7 +54,7 @@ pub enum CallError {
     },
 }
 
-/// A client of a service. Clones are the same client.
+/// A service client. Clones share the client.
 #[derive(Clone)]
 pub struct Client(Arc<Inner>);
 
@@ -70,7 +70,7 @@ struct Inner {
 
 /// Endpoints of a client.
 struct Remote {
-    asking: Asking,
+    remote_calls: RemoteCalls,
     _task: Task<()>,
     _graph: [NodeEndpoint; 2],
 }
@@ -81,8 +81,8 @@ impl Client {
         &self.0.name
     }
 
-    /// Asks with little-endian CDR, encapsulation header first; the answer is CDR too. A call that is
-    /// dropped is over.
+    /// Calls with little-endian CDR, encapsulation header first; the reply is CDR too. Dropping the future
+    /// cancels the call.
     pub fn call(
         &self,
         request: Vec<u8>,
@@ -105,12 +105,15 @@ impl Inner {
             Some(server) => {
                 let (answered, answer) = bounded(1);
                 match server.try_send(LocalCall { request, answered }) {
-                    Ok(()) => answer.recv().await.unwrap_or(Err("it has ended".into())),
-                    Err(_) => Err("busy, ask again".to_owned()),
+                    Ok(()) => answer
+                        .recv()
+                        .await
+                        .unwrap_or(Err("the server has ended".into())),
+                    Err(_) => Err("the server is busy; retry".to_owned()),
                 }
             }
             None => match self.remote() {
-                Ok(remote) => remote.asking.call(&request).await,
+                Ok(remote) => remote.remote_calls.call(&request).await,
                 Err(error) => Err(error.to_string()),
             },
         };
@@ -120,7 +123,7 @@ impl Inner {
         })
     }
 
-    /// The server in this process. Endpoints of ours would be in its way.
+    /// Server in this process. It needs no DDS endpoints.
     fn local(&self) -> Option<smol::channel::Sender<LocalCall>> {
         let shared = self.shared.upgrade()?;
         let server = shared.services.find(&self.name, self.service)?;
@@ -143,7 +146,9 @@ impl Inner {
         let name = self.name.clone();
         let remote = lock(&self.remote);
         match &*remote {
-            Some(remote) if remote.asking.servers.remote() == 0 => CallError::NoServer { name },
+            Some(remote) if remote.remote_calls.servers.remote() == 0 => {
+                CallError::NoServer { name }
+            }
             _ => CallError::Late {
                 name,
                 patience_s: patience.as_secs_f64(),
@@ -153,7 +158,7 @@ impl Inner {
 }
 
 impl Shared {
-    /// A client of `S` under a full name.
+    /// Creates a client of `S` under a full name.
     pub(crate) fn client<S: RosService>(self: &Arc<Self>, node: NodeId, name: String) -> Client {
         Client(Arc::new(Inner {
             shared: Arc::downgrade(self),
@@ -191,18 +196,18 @@ impl Shared {
             .map(|kind| Arc::new(Peers::new(name, kind, log::Level::Debug)));
         self.endpoints.register(requests.id(), &servers);
         self.endpoints.register(answers.id(), &answerers);
-        let waiting = Arc::new(Waiting::default());
+        let waiting = Arc::new(PendingCalls::default());
         let listen = Arc::clone(&waiting).listen(Arc::clone(&answers));
         let task = self.io.spawn(listen).ok_or_else(|| closed(name))?;
         let next = AtomicI64::new(1);
         Ok(Remote {
-            asking: Asking {
+            remote_calls: RemoteCalls {
                 form,
                 requests,
                 servers,
                 answerers,
                 answers,
-                acquainted: Mutex::default(),
+                last_matched: Mutex::default(),
                 waiting,
                 next,
             },

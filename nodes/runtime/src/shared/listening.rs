@@ -1,16 +1,16 @@
-//! The graph of all nodes, of which other participants publish their parts.
+//! Graph of all nodes, from the messages of other participants.
 
 use std::sync::Arc;
 
 use super::Shared;
+use crate::discovered_graph::GraphEndpoint;
 use crate::endpoints::Endpoints;
-use crate::neighbours::GraphEndpoint;
 use crate::port::{GRAPH_TOPIC, SampleReader};
 use crate::sync::lock;
 
 impl Shared {
-    /// Publishers, subscriptions and servers that are known by now, of all processes. The first call begins
-    /// to listen for the names of nodes elsewhere.
+    /// Known publishers, subscriptions and servers of all processes. The first call subscribes to the node lists
+    /// of other processes.
     pub(crate) fn graph_of_all(self: &Arc<Self>) -> Vec<GraphEndpoint> {
         if let Some(open) = lock(&self.open).as_mut()
             && open.graph_of_others.is_none()
@@ -19,13 +19,13 @@ impl Shared {
                 None => None,
                 Some(Ok(reader)) => self.io.spawn(listen(reader, Arc::clone(&self.endpoints))),
                 Some(Err(error)) => {
-                    log::warn!("nodes elsewhere have no names: {error}");
+                    log::warn!("node names of other processes are unavailable: {error}");
                     None
                 }
             };
         }
         let mut all = self.graph.all();
-        all.extend(self.endpoints.neighbours.all());
+        all.extend(self.endpoints.discovered_graph.all());
         all
     }
 }
@@ -34,7 +34,7 @@ async fn listen(reader: Box<dyn SampleReader>, endpoints: Arc<Endpoints>) {
     loop {
         let heard = match reader.next().await {
             Ok(_) => {
-                let heard = endpoints.neighbours.hear(&reader.bytes());
+                let heard = endpoints.discovered_graph.on_message(&reader.bytes());
                 heard.map_err(|error| error.to_string())
             }
             Err(error) => Err(error),

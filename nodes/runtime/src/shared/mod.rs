@@ -1,4 +1,4 @@
-//! The parts that the nodes of a process share: the participant, the threads, the local bus.
+//! State shared by the nodes of a process: participant, threads, local bus.
 
 mod calling;
 mod listening;
@@ -36,20 +36,20 @@ use super::rmw_zenoh::Zenoh;
 use super::security::Enclave;
 use super::service::{Answers, LocalServices, Server, Unanswered};
 use super::shutdown::Shutdown;
-use super::subscription::{Intake, Load, Sample, Stats, Subscription};
+use super::subscription::{Intake, Sample, Stats, Subscription, SubscriptionExecutor};
 use super::sync::{lock, wait_for};
 use super::task_thread::TaskThread;
 
-/// Messages that wait in the queue of one publisher, at most.
+/// Queue length of one publisher, messages.
 const QUEUE_MESSAGES: usize = 1024;
 
-/// Bytes that wait in the queue of one publisher, at most.
+/// Queue size of one publisher, bytes.
 const QUEUE_BYTES: usize = 128 << 20;
 
-/// Longest time for each phase of the end: handlers, answers, queues.
+/// Timeout of each shutdown phase: handlers, replies, queues.
 const DRAIN_TIME: Duration = Duration::from_secs(2);
 
-/// Length of a message that is accepted unless a parameter says otherwise.
+/// Default limit of message length, bytes.
 pub(crate) const DEFAULT_MAX_MESSAGE_BYTES: usize = 64 << 20;
 
 /// The participant, threads and local bus of a process.
@@ -59,9 +59,9 @@ pub(crate) struct Shared {
     pub io: TaskThread,
     pub tasks: Arc<Tasks>,
     pub receive_buffer: ReceiveBuffer,
-    /// Greatest count of each loss so far.
+    /// Largest count of each loss so far.
     losses: Mutex<BTreeMap<String, u64>>,
-    /// Simulated time, one for all nodes of a process.
+    /// Simulated time, shared by all nodes of a process.
     sim_time: Mutex<Option<(Arc<AtomicI64>, Subscription)>>,
     publishing: TaskThread,
     answers: Answers,
@@ -71,13 +71,13 @@ pub(crate) struct Shared {
     open: Mutex<Option<Open>>,
 }
 
-/// Everything that goes at shutdown.
+/// State released at shutdown.
 struct Open {
     transport: Arc<dyn Transport>,
     _watch: Option<Task<()>>,
     publishers: Vec<Weak<PublisherParts>>,
     intakes: Vec<Weak<Intake>>,
-    /// Topics and counts of subscriptions, also of those that have ended.
+    /// Topics and counters of subscriptions, ended ones included.
     subscribed: VecDeque<(String, Arc<Stats>)>,
     readers: Vec<(Sender<()>, JoinHandle<()>)>,
     servers: Vec<Server>,
@@ -126,7 +126,7 @@ impl Shared {
         Ok(shared)
     }
 
-    /// Publishes which nodes there are, unless their endpoints name them.
+    /// Publishes the node list, unless endpoints announce their nodes.
     fn publish_graph(&self) -> Result<(), RuntimeError> {
         let writer = lock(&self.open)
             .as_ref()
@@ -160,7 +160,7 @@ impl Shared {
         }
     }
 
-    /// A queue that the publisher thread serves, until the last handle of it goes.
+    /// Creates a queue that the publisher thread serves until its last handle is dropped.
     fn outbox(
         &self,
         topic: PortTopic<'_>,
@@ -184,7 +184,7 @@ impl Shared {
         Ok(Arc::new(outbox))
     }
 
-    /// Result of `make` on the open transport; after shutdown an error that names the topic or service.
+    /// Result of `make` on the open transport; after shutdown an error with the topic or service.
     fn transport<T>(
         &self,
         name: &str,
@@ -195,7 +195,7 @@ impl Shared {
         make(&*open.transport)
     }
 
-    /// A reader of samples up to `max_bytes`.
+    /// Creates a reader of samples up to `max_bytes`.
     fn reader(
         &self,
         topic: PortTopic<'_>,
@@ -207,7 +207,7 @@ impl Shared {
         })
     }
 
-    /// The time on `topic`, subscribed to at the first call.
+    /// Time on `topic`, subscribed to at the first call.
     pub(crate) fn sim_clock(
         self: &Arc<Self>,
         node: NodeId,
@@ -224,52 +224,59 @@ impl Shared {
                 now_ns.store(message.clock.to_ns(), Relaxed);
             }
         };
-        let subscription =
-            self.subscribe(node, topic, &Qos::CLOCK, Load::Small, 1 << 10, handler)?;
+        let subscription = self.subscribe(
+            node,
+            topic,
+            &Qos::CLOCK,
+            SubscriptionExecutor::Shared,
+            1 << 10,
+            handler,
+        )?;
         *sim = Some((Arc::clone(&shown), subscription));
         Ok(shown)
     }
 
-    /// Publishers that are in use.
+    /// Publishers in use.
     pub(crate) fn publishers(&self) -> Vec<Arc<PublisherParts>> {
         let open = lock(&self.open);
         let all = open.iter().flat_map(|open| &open.publishers);
         all.filter_map(Weak::upgrade).collect()
     }
 
-    /// Publishers in other processes, on any topic.
+    /// Publishers of other processes, on any topic.
     pub(crate) fn remote_publishers(&self) -> Vec<RemotePublisher> {
         self.endpoints.remotes.all()
     }
 
-    /// Subscriptions that are in use.
+    /// Subscriptions in use.
     pub(crate) fn intakes(&self) -> Vec<Arc<Intake>> {
         let open = lock(&self.open);
         let all = open.iter().flat_map(|open| &open.intakes);
         all.filter_map(Weak::upgrade).collect()
     }
 
-    /// Counts of the last subscriptions, by topic, also of those that have ended.
+    /// Counters of recent subscriptions by topic, ended ones included.
     fn subscribed(&self) -> Vec<(String, Arc<Stats>)> {
         let open = lock(&self.open);
         let all = open.iter().flat_map(|open| &open.subscribed);
         all.cloned().collect()
     }
 
-    /// Requests that came to nothing, of all servers.
+    /// Requests without reply, of all servers.
     pub(crate) fn unanswered(&self) -> Vec<Arc<Unanswered>> {
         let open = lock(&self.open);
         let all = open.iter().flat_map(|open| &open.unanswered);
         all.filter_map(Weak::upgrade).collect()
     }
 
-    /// Participants that security keeps out.
-    fn strangers(&self) -> usize {
+    /// Number of participants rejected by DDS Security.
+    fn unauthenticated_participants(&self) -> usize {
         let open = lock(&self.open);
-        open.as_ref().map_or(0, |open| open.transport.strangers())
+        open.as_ref()
+            .map_or(0, |open| open.transport.unauthenticated_participants())
     }
 
-    /// Gives handlers the messages that wait in this process. Not from a thread of the runtime.
+    /// Waits until the handlers have processed the queued messages of this process. Not from a thread of the runtime.
     pub(crate) fn work_off(&self, deadline: Instant) {
         let orders: Vec<_> = (self.intakes().into_iter())
             .filter_map(|intake| Some((intake.work_off()?, intake)))
@@ -277,12 +284,12 @@ impl Shared {
         for (order, intake) in orders {
             if !wait_for(&order, deadline) {
                 let topic = &intake.topic;
-                log::warn!("{topic}: messages of this process were not handled");
+                log::warn!("{topic}: queued messages of this process were not handled");
             }
         }
     }
 
-    /// Ends the runtime: handlers and clients get their last messages, timers and readers end, queues
+    /// Shuts the runtime down: handlers and clients receive their last messages, timers and readers end, queues
     /// are sent, and the participant leaves.
     ///
     /// Not from a thread of the runtime.
@@ -298,7 +305,7 @@ impl Shared {
         self.io.stop();
         for (stop, thread) in open.readers {
             stop.close();
-            // Its panic has been reported by the thread itself.
+            // The thread has reported its own panic.
             let _ = thread.join();
         }
         let publishers = open.publishers.iter().filter_map(Weak::upgrade);
@@ -307,14 +314,17 @@ impl Shared {
         let deadline = deadline();
         for writer in &writers {
             if !writer.flush(deadline.saturating_duration_since(Instant::now())) {
-                log::warn!("{}: not everything was delivered", writer.topic());
+                log::warn!("{}: not all messages were delivered", writer.topic());
             }
         }
-        // The nodes go while all their endpoints are there, these go next, the participant last.
+        // Nodes are removed while their endpoints exist, then the endpoints, the participant last.
         if let Some((task, graph)) = open.graph {
             drop(task);
             if !self.graph.leave(open.transport.id(), &graph) {
-                log::debug!("{}: not everyone has acknowledged the end", graph.topic());
+                log::debug!(
+                    "{}: not all readers have acknowledged the empty node list",
+                    graph.topic()
+                );
             }
             graph.close();
         }
@@ -327,7 +337,7 @@ impl Shared {
     }
 }
 
-/// The participant or session of the process, over the transport that the environment names.
+/// Opens the participant or session of the process, on the transport given by the environment.
 fn join(network: &Network, enclave: &Enclave) -> Result<Arc<dyn Transport>, RuntimeError> {
     match network.transport {
         TransportKind::Dds => Ok(Arc::new(Cyclone::join(network, enclave)?)),
@@ -336,7 +346,7 @@ fn join(network: &Network, enclave: &Enclave) -> Result<Arc<dyn Transport>, Runt
     }
 }
 
-/// End of a phase of the shutdown that begins now.
+/// Deadline of a shutdown phase that begins now.
 pub(crate) fn deadline() -> Instant {
     let now = Instant::now();
     now.checked_add(DRAIN_TIME).unwrap_or(now)

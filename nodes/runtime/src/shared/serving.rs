@@ -19,18 +19,18 @@ use crate::remote::GraphRole;
 use crate::service::{Reply, Server, Serving, Unanswered};
 use crate::sync::lock;
 
-/// Requests are short.
+/// QoS of servers: requests are short.
 const QOS: ServiceQos = ServiceQos {
     reader: Qos::REQUESTS,
     writer: Qos::SERVICES,
     max_bytes: 1 << 20,
 };
 
-/// Between two warnings of unreadable requests.
+/// Period of warnings about undecodable requests.
 const WARNING_PERIOD: Duration = Duration::from_secs(5);
 
 impl Shared {
-    /// Serves `S` under a full name, up to `max_pending` requests at a time.
+    /// Serves `S` under a full name, with up to `max_pending` requests in progress.
     pub(crate) fn serve<S: RosService + 'static>(
         &self,
         node: NodeId,

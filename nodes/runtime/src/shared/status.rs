@@ -1,4 +1,4 @@
-//! The runtime's own diagnostics: buffers, drops, peers that do not match.
+//! Diagnostics of the runtime: buffers, drops, incompatible peers.
 
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -13,10 +13,10 @@ use crate::port::{RECEIVE_BUFFER_BYTES, ReaderLosses};
 use crate::subscription::Stats;
 use crate::sync::lock;
 
-/// Below this, bursts of large messages are lost; twice the largest message is needed.
+/// Smallest sufficient receive buffer: twice the largest message; with less, bursts of large messages are lost.
 const ENOUGH_BYTES: usize = 16 << 20;
 
-/// Receive buffer that the kernel grants a socket, asked once.
+/// Receive buffer that the kernel grants a socket, probed once.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReceiveBuffer {
     bytes: Option<usize>,
@@ -26,7 +26,7 @@ impl ReceiveBuffer {
     pub(crate) fn probe(transport: TransportKind) -> Self {
         let bytes = match transport {
             TransportKind::Dds => granted_receive_buffer(RECEIVE_BUFFER_BYTES),
-            // TCP waits for its reader.
+            // TCP has flow control.
             #[cfg(feature = "zenoh")]
             TransportKind::Zenoh => None,
         };
@@ -37,7 +37,7 @@ impl ReceiveBuffer {
         self.bytes.is_some_and(|bytes| bytes < ENOUGH_BYTES)
     }
 
-    /// Logs the command that mends a short buffer.
+    /// Logs the command that enlarges a short buffer.
     pub(crate) fn warn_if_short(self) {
         if let Some(bytes) = self.bytes.filter(|_| self.is_short()) {
             log::warn!(
@@ -49,30 +49,30 @@ impl ReceiveBuffer {
     }
 }
 
-/// Receive buffer in bytes that the kernel grants a socket which asks for so many. `None`: not known.
+/// Receive buffer (bytes) granted by the kernel for a request of `bytes`. `None`: unknown.
 fn granted_receive_buffer(bytes: usize) -> Option<usize> {
     let socket = Socket::new(Domain::IPV4, Type::DGRAM, None).ok()?;
-    // The kernel grants what it may without an error.
+    // The kernel reduces the size without an error.
     socket.set_recv_buffer_size(bytes).ok()?;
     socket.recv_buffer_size().ok()
 }
 
 const QOS: &str = "QoS does not match";
 
-/// Losses kept, at most.
+/// Limit of stored losses.
 pub(super) const MAX_LOSSES: usize = 1000;
 
-/// Something that went wrong between this process and another.
-struct Trouble {
-    /// Topic or service, and what happened there.
+/// A problem between this process and another.
+struct TransportProblem {
+    /// Topic or service, and the kind of problem.
     of: String,
     count: u64,
-    /// The same for every topic.
+    /// Text without the topic.
     problem: &'static str,
 }
 
-impl Trouble {
-    /// `None` if there was none.
+impl TransportProblem {
+    /// `None` if the count is zero.
     fn of(topic: &str, what: &str, count: u64, problem: &'static str) -> Option<Self> {
         (count > 0).then(|| Self {
             of: format!("{topic} {what}"),
@@ -82,8 +82,8 @@ impl Trouble {
     }
 }
 
-/// Messages that a subscription did not have.
-fn not_had(topic: &str, stats: &Stats) -> Vec<Trouble> {
+/// Lost and undecodable messages of a subscription.
+fn not_had(topic: &str, stats: &Stats) -> Vec<TransportProblem> {
     let ReaderLosses {
         on_network,
         overrun,
@@ -93,8 +93,9 @@ fn not_had(topic: &str, stats: &Stats) -> Vec<Trouble> {
         ("lost_on_network", on_network, "messages lost"),
         ("overrun", overrun, "messages lost"),
     ];
-    let troubles =
-        counts.map(|(what, count, problem)| Trouble::of(topic, what, count.load(Relaxed), problem));
+    let troubles = counts.map(|(what, count, problem)| {
+        TransportProblem::of(topic, what, count.load(Relaxed), problem)
+    });
     troubles.into_iter().flatten().collect()
 }
 
@@ -107,7 +108,7 @@ impl Shared {
             ("socket_receive_buffer_bytes".to_owned(), bytes),
             (
                 "participants_kept_out".to_owned(),
-                self.strangers().to_string(),
+                self.unauthenticated_participants().to_string(),
             ),
         ];
         let mut problems = Vec::new();
@@ -129,7 +130,7 @@ impl Shared {
         status(node, "transport", level, message, values)
     }
 
-    /// Messages and requests lost so far, by topic; of publishers and servers that have ended as of the last status.
+    /// Messages and requests lost so far, by topic; for ended publishers and servers as of the last status.
     pub(crate) fn losses(&self) -> Vec<(String, u64)> {
         self.note_losses(&self.troubles());
         for (topic, stats) in self.subscribed() {
@@ -138,7 +139,7 @@ impl Shared {
         lock(&self.losses).clone().into_iter().collect()
     }
 
-    fn note_losses(&self, troubles: &[Trouble]) {
+    fn note_losses(&self, troubles: &[TransportProblem]) {
         let mut losses = lock(&self.losses);
         for trouble in troubles.iter().filter(|trouble| trouble.problem != QOS) {
             if losses.len() < MAX_LOSSES || losses.contains_key(&trouble.of) {
@@ -148,15 +149,20 @@ impl Shared {
         }
     }
 
-    /// Everything that was lost or does not match, with its count.
-    fn troubles(&self) -> Vec<Trouble> {
+    /// All losses and incompatibilities, with their counts.
+    fn troubles(&self) -> Vec<TransportProblem> {
         let mut troubles = Vec::new();
         for publisher in self.publishers() {
             let topic = publisher.peers.topic();
             let dropped = publisher.writer.dropped();
-            troubles.extend(Trouble::of(topic, "dropped", dropped, "messages dropped"));
+            troubles.extend(TransportProblem::of(
+                topic,
+                "dropped",
+                dropped,
+                "messages dropped",
+            ));
             let incompatible = publisher.peers.incompatible_count() as u64;
-            troubles.extend(Trouble::of(
+            troubles.extend(TransportProblem::of(
                 topic,
                 "incompatible_subscribers",
                 incompatible,
@@ -167,7 +173,7 @@ impl Shared {
             let topic = &intake.topic;
             troubles.extend(not_had(topic, &intake.stats));
             let incompatible = intake.peers.incompatible_count() as u64;
-            troubles.extend(Trouble::of(
+            troubles.extend(TransportProblem::of(
                 topic,
                 "incompatible_publishers",
                 incompatible,
@@ -177,8 +183,18 @@ impl Shared {
         const REQUESTS: &str = "requests not answered";
         for of in self.unanswered() {
             let (lost, failed) = (of.lost.load(Relaxed), of.failed.load(Relaxed));
-            troubles.extend(Trouble::of(&of.name, "requests_lost", lost, REQUESTS));
-            troubles.extend(Trouble::of(&of.name, "requests_failed", failed, REQUESTS));
+            troubles.extend(TransportProblem::of(
+                &of.name,
+                "requests_lost",
+                lost,
+                REQUESTS,
+            ));
+            troubles.extend(TransportProblem::of(
+                &of.name,
+                "requests_failed",
+                failed,
+                REQUESTS,
+            ));
         }
         troubles
     }

@@ -18,18 +18,18 @@ use crate::port::{EndpointKind, PortTopic};
 use crate::qos::{Durability, Qos};
 use crate::remote::GraphRole;
 use crate::subscription::{
-    Intake, Load, Running, Sample, Source, Stats, Subscription, spawn_reader,
+    Intake, Running, Sample, Source, Stats, Subscription, SubscriptionExecutor, spawn_reader,
 };
 use crate::sync::lock;
 
-/// Small messages of a publisher in this process that wait for a subscription, at least. They are
-/// shared, not copied, and the handler that they wait for returns at once.
+/// Queue length for small messages of publishers in this process. Messages are
+/// shared, not copied, and their handler returns at once.
 const LOCAL_SMALL_MESSAGES: usize = 1024;
 
-/// The same for large ones: several bursts of line scans, and not too much of 4 MB clouds.
+/// Queue length for large messages: several bursts of line scans, and a bounded number of 4 MB clouds.
 const LOCAL_LARGE_MESSAGES: usize = 128;
 
-/// Way of a subscription to the messages of its own process.
+/// Function that joins a subscription to the local bus.
 type Join = fn(
     &Arc<Topic>,
     &Arc<Peers>,
@@ -44,7 +44,7 @@ impl Shared {
         node: NodeId,
         topic: &str,
         qos: &Qos,
-        load: Load,
+        executor: SubscriptionExecutor,
         max_bytes: usize,
         handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
@@ -53,16 +53,24 @@ impl Shared {
                 .join_subscriber::<M>(peers, sender, lost, latched)
                 .map(Some)
         };
-        self.subscribe_with(node, (topic, M::TYPE), qos, load, max_bytes, join, handler)
+        self.subscribe_with(
+            node,
+            (topic, M::TYPE),
+            qos,
+            executor,
+            max_bytes,
+            join,
+            handler,
+        )
     }
 
-    /// The same of any type, as CDR bytes. What this process publishes is not heard.
+    /// Subscribes to any type, as CDR bytes, without messages of this process.
     pub(crate) fn subscribe_raw(
         self: &Arc<Self>,
         node: NodeId,
         of: (&str, &str),
         qos: &Qos,
-        load: Load,
+        executor: SubscriptionExecutor,
         max_bytes: usize,
         mut handler: impl FnMut(Vec<u8>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
@@ -70,7 +78,7 @@ impl Shared {
             handler(stats.take_bytes(sample));
         };
         let join: Join = |_, _, _, _, _| Ok(None);
-        self.subscribe_with(node, of, qos, load, max_bytes, join, take)
+        self.subscribe_with(node, of, qos, executor, max_bytes, join, take)
     }
 
     #[expect(
@@ -82,7 +90,7 @@ impl Shared {
         node: NodeId,
         (topic, type_name): (&str, &str),
         qos: &Qos,
-        load: Load,
+        executor: SubscriptionExecutor,
         max_bytes: usize,
         join: Join,
         mut handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
@@ -96,9 +104,9 @@ impl Shared {
         };
         let reader = self.reader(port_topic, qos, max_bytes)?;
         let stats = Arc::new(Stats::new(Arc::clone(&peers), reader.losses()));
-        let (sender, local) = bounded(qos.depth.max(match load {
-            Load::Small => LOCAL_SMALL_MESSAGES,
-            Load::Large => LOCAL_LARGE_MESSAGES,
+        let (sender, local) = bounded(qos.depth.max(match executor {
+            SubscriptionExecutor::Shared => LOCAL_SMALL_MESSAGES,
+            SubscriptionExecutor::Dedicated => LOCAL_LARGE_MESSAGES,
         }));
         let (place, overrun) = (self.bus.topic(topic), Arc::clone(&stats.losses.overrun));
         let latched = qos.durability == Durability::TransientLocal;
@@ -123,11 +131,11 @@ impl Shared {
             stats: Arc::clone(&stats),
         };
         let task = source.run(move |sample: Sample<'_, M>| handler(sample, &stats));
-        let running = match load {
-            Load::Small => Running::OnIoThread {
+        let running = match executor {
+            SubscriptionExecutor::Shared => Running::OnIoThread {
                 _task: self.io.spawn(task).ok_or_else(|| closed(topic))?,
             },
-            Load::Large => {
+            SubscriptionExecutor::Dedicated => {
                 let (stop, thread) = spawn_reader(&self.shutdown, task)?;
                 if let Some(open) = lock(&self.open).as_mut() {
                     open.readers.retain(|(_, thread)| !thread.is_finished());

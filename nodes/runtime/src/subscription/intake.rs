@@ -1,4 +1,4 @@
-//! The handle of a subscription's task.
+//! Handle of a subscription's task.
 
 use std::sync::Arc;
 
@@ -8,20 +8,20 @@ use super::Stats;
 use crate::graph::NodeEndpoint;
 use crate::peers::Peers;
 
-/// A subscription as the process sees it.
+/// Subscription as registered in the process.
 pub(crate) struct Intake {
     pub topic: String,
     pub type_name: String,
     pub peers: Arc<Peers>,
     pub stats: Arc<Stats>,
-    /// Orders to give the handler everything that waits in this process; the task drops the sender of one
-    /// that is carried out.
+    /// Orders to process all queued messages of this process; the task drops the received sender
+    /// when done.
     pub orders: Sender<Sender<()>>,
     pub _graph: NodeEndpoint,
 }
 
 impl Intake {
-    /// Has the task give its handler all that waits in this process; the receiver ends when that is done.
+    /// Orders the task to process all queued messages of this process; the receiver closes when done.
     /// `None`: the task has ended.
     pub(crate) fn work_off(&self) -> Option<Receiver<()>> {
         let (done, carried_out) = bounded(1);

@@ -22,18 +22,18 @@ use super::peers::Peers;
 use super::port::ReaderLosses;
 use super::shutdown::Shutdown;
 use super::sync::lock;
-use super::task_thread::guarded;
+use super::task_thread::run_catching_panics;
 
-/// Between two warnings of undecodable samples.
+/// Period of warnings about undecodable samples.
 const WARNING_PERIOD: Duration = Duration::from_secs(5);
 
-/// Size of the messages of a subscription, which decides the thread that takes them.
+/// Thread that executes the handler of a subscription.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Load {
-    /// Poses, transforms, clocks: taken on the io thread.
-    Small,
-    /// Clouds, images: taken on a thread of their own.
-    Large,
+pub enum SubscriptionExecutor {
+    /// The io thread, shared by all: for poses, transforms, clocks.
+    Shared,
+    /// A thread of its own: for clouds, images.
+    Dedicated,
 }
 
 /// A subscription; dropping it ends it.
@@ -55,7 +55,7 @@ pub(crate) struct Stats {
     peers: Arc<Peers>,
     received: AtomicU64,
     pub undecodable: AtomicU64,
-    /// Messages of either kind that are not had, those of this process included.
+    /// Lost messages, those of this process included.
     pub losses: ReaderLosses,
     warning: Throttle,
 }
@@ -70,45 +70,45 @@ impl Subscription {
         self.stats().peers.topic()
     }
 
-    /// Matched publishers, here and in other processes.
+    /// Matched publishers in all processes.
     pub fn publisher_count(&self) -> usize {
         self.stats().peers.count()
     }
 
-    /// Messages given to the handler.
+    /// Messages passed to the handler.
     pub fn received(&self) -> u64 {
         self.stats().received.load(Relaxed)
     }
 
-    /// Calls `callback` for every publisher that joins, and now if there is one already.
+    /// Calls `callback` at every match with a publisher, and now if one is matched already.
     ///
     /// It runs on a thread of the runtime and must return at once.
     pub fn on_publisher_joined(&self, callback: impl FnMut() + Send + 'static) {
         self.stats().peers.on_joined(Box::new(callback));
     }
 
-    /// Messages that were sent and did not get here, or gave way to newer ones.
+    /// Messages that were sent and not handled: lost on the network, or overrun.
     pub fn lost(&self) -> u64 {
         self.stats().lost()
     }
 
-    /// Those of [`Subscription::lost`] that were sent and did not get here.
+    /// Messages lost on the network, as part of [`Subscription::lost`].
     pub fn lost_on_network(&self) -> u64 {
         self.stats().losses.on_network.load(Relaxed)
     }
 
-    /// Those of [`Subscription::lost`] that came, and gave way to newer ones before the handler had them.
+    /// Messages overwritten by newer ones before they were handled, as part of [`Subscription::lost`].
     pub fn overrun(&self) -> u64 {
         self.stats().losses.overrun.load(Relaxed)
     }
 
-    /// Samples that were no message of this type, or too long, and were left out.
+    /// Samples rejected because they are too long or not of this type.
     pub fn undecodable(&self) -> u64 {
         self.stats().undecodable.load(Relaxed)
     }
 }
 
-/// Losses of some subscriptions, summed up; clones share them, and outlive the subscriptions.
+/// Sum of the losses of some subscriptions; clones share it, and it outlives the subscriptions.
 #[derive(Clone, Default)]
 pub struct Losses(Arc<Mutex<Vec<Arc<Stats>>>>);
 
@@ -165,7 +165,7 @@ impl Stats {
             .saturating_add(overrun.load(Relaxed))
     }
 
-    /// Decodes a sample and counts what comes of it.
+    /// Decodes a sample and counts the outcome.
     pub(crate) fn decode<M: RosMessage>(&self, sample: Sample<'_, M>) -> Option<Arc<M>> {
         let message = match sample {
             Sample::Shared(message) => Some(message),
@@ -180,7 +180,7 @@ impl Stats {
         message
     }
 
-    /// Takes the bytes of a sample as they are.
+    /// Takes the bytes of a sample without decoding.
     pub(crate) fn take_bytes(&self, sample: Sample<'_, Infallible>) -> Vec<u8> {
         self.received.fetch_add(1, Relaxed);
         match sample {
@@ -198,7 +198,7 @@ impl Stats {
     }
 }
 
-/// A message as a subscription gets it.
+/// A message before decoding.
 pub(crate) enum Sample<'a, M> {
     /// From this process.
     Shared(Arc<M>),
@@ -206,7 +206,7 @@ pub(crate) enum Sample<'a, M> {
     Cdr(&'a mut Vec<u8>),
 }
 
-/// A message that is decoded on the thread that needs it, not on the one that received it.
+/// A message to be decoded on another thread than the receiving one.
 pub struct Undecoded<M> {
     content: Content<M>,
     stats: Arc<Stats>,
@@ -228,7 +228,7 @@ impl<M: RosMessage> Undecoded<M> {
         }
     }
 
-    /// Length in bytes; `shared` measures a message that comes from this process.
+    /// Length in bytes; `shared` measures a message of this process.
     pub fn bytes(&self, shared: impl FnOnce(&M) -> usize) -> usize {
         match &self.content {
             Content::Shared(message) => shared(message),
@@ -236,7 +236,7 @@ impl<M: RosMessage> Undecoded<M> {
         }
     }
 
-    /// The message as CDR, as it came or, if it comes from this process, as it would be sent; not checked.
+    /// CDR of the message, unchecked: as received, or serialized if it comes from this process.
     pub fn into_cdr(self) -> Result<Vec<u8>, cdr::CdrError> {
         self.stats.received.fetch_add(1, Relaxed);
         match self.content {
@@ -245,7 +245,7 @@ impl<M: RosMessage> Undecoded<M> {
         }
     }
 
-    /// The message. `None`: the bytes are no message of the type, which is counted and logged.
+    /// Decodes the message. `None`: the bytes are not of the type, which is counted and logged.
     pub fn decode(self) -> Option<Arc<M>> {
         let Self { content, stats } = self;
         match content {
@@ -255,7 +255,7 @@ impl<M: RosMessage> Undecoded<M> {
     }
 }
 
-/// Runs a subscription on a thread of its own until the sender is dropped.
+/// Runs a subscription on a separate thread until the sender is dropped.
 pub(crate) fn spawn_reader(
     shutdown: &Shutdown,
     task: impl Future<Output = ()> + Send + 'static,
@@ -265,7 +265,7 @@ pub(crate) fn spawn_reader(
     let thread = std::thread::Builder::new()
         .name("reader".to_owned())
         .spawn(move || {
-            guarded("reader", &shutdown, || {
+            run_catching_panics("reader", &shutdown, || {
                 smol::future::block_on(smol::future::or(task, async {
                     // Ends when the sender closes.
                     let _ = stopped.recv().await;

@@ -1,4 +1,4 @@
-//! The task of a subscription: from DDS and from this process to one handler.
+//! Task of a subscription: delivers messages of DDS and of this process to one handler.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -10,10 +10,10 @@ use super::{Sample, Stats};
 use crate::local_bus::{AnyMessage, LocalEndpoint};
 use crate::port::SampleReader;
 
-/// After so many messages in a row, a task lets the others of its thread have a turn.
+/// Consecutive messages of a task before it yields to others of its thread.
 const MESSAGES_PER_TURN: u32 = 16;
 
-/// Everything one subscription hears.
+/// Inputs of one subscription.
 pub(crate) struct Source {
     pub reader: Box<dyn SampleReader>,
     /// See [`Intake::orders`].
@@ -21,15 +21,15 @@ pub(crate) struct Source {
     /// [`Intake::orders`]: super::Intake::orders
     pub orders: Receiver<Sender<()>>,
     pub local: Receiver<AnyMessage>,
-    /// None: what this process publishes is not heard.
+    /// `None`: messages of this process are not delivered.
     pub _local: Option<LocalEndpoint>,
-    /// Keeps `local` open where no publisher has it.
+    /// Keeps `local` open without a local publisher.
     pub _sender: Sender<AnyMessage>,
     pub stats: Arc<Stats>,
 }
 
 impl Source {
-    /// Gives messages to the handler until the task is dropped.
+    /// Passes messages to the handler until the task is dropped.
     pub(crate) async fn run<M: Any + Send + Sync>(self, mut handler: impl FnMut(Sample<'_, M>)) {
         let mut turn: u32 = 0;
         loop {
@@ -38,12 +38,12 @@ impl Source {
                 smol::future::yield_now().await;
             }
             match self.next(turn.is_multiple_of(2)).await {
-                Heard::Local(message) => give_shared(message, &mut handler),
-                Heard::Remote(Ok(())) => {
+                SubscriptionEvent::Local(message) => give_shared(message, &mut handler),
+                SubscriptionEvent::Remote(Ok(())) => {
                     handler(Sample::Cdr(&mut self.reader.bytes()));
                 }
-                Heard::Remote(Err(why)) => self.stats.not_decodable(&why),
-                Heard::WorkOff(done) => {
+                SubscriptionEvent::Remote(Err(why)) => self.stats.not_decodable(&why),
+                SubscriptionEvent::WorkOff(done) => {
                     for _ in 0..self.local.len() {
                         let message = self.local.try_recv();
                         message
@@ -52,16 +52,26 @@ impl Source {
                     }
                     drop(done);
                 }
-                Heard::End => return,
+                SubscriptionEvent::End => return,
             }
         }
     }
 
-    /// Both sides get their turn, whichever has more to say.
-    async fn next(&self, local_first: bool) -> Heard {
-        let order = async { self.orders.recv().await.map_or(Heard::End, Heard::WorkOff) };
-        let local = async { self.local.recv().await.map_or(Heard::End, Heard::Local) };
-        let remote = async { Heard::Remote(self.reader.next().await.map(drop)) };
+    /// Awaits the next event; local and remote messages alternate in priority.
+    async fn next(&self, local_first: bool) -> SubscriptionEvent {
+        let order = async {
+            self.orders
+                .recv()
+                .await
+                .map_or(SubscriptionEvent::End, SubscriptionEvent::WorkOff)
+        };
+        let local = async {
+            self.local
+                .recv()
+                .await
+                .map_or(SubscriptionEvent::End, SubscriptionEvent::Local)
+        };
+        let remote = async { SubscriptionEvent::Remote(self.reader.next().await.map(drop)) };
         if local_first {
             or(order, or(local, remote)).await
         } else {
@@ -76,7 +86,7 @@ fn give_shared<M: Any + Send + Sync>(message: AnyMessage, handler: &mut impl FnM
     }
 }
 
-enum Heard {
+enum SubscriptionEvent {
     WorkOff(Sender<()>),
     Local(AnyMessage),
     Remote(Result<(), String>),

@@ -1,5 +1,5 @@
-//! Checksum of the updates of an epoch, by which a follower knows that it has had them all and no others;
-//! `msgs/msg/LatticeMapUpdate.msg` says how it is made.
+//! Checksum of the updates of an epoch, by which a follower verifies that it has received exactly these updates.
+//! `msgs/msg/LatticeMapUpdate.msg` defines it.
 
 use lattice_core::lattice::MortonKey;
 use lattice_msgs::lattice::LatticeMapUpdate;
@@ -11,13 +11,13 @@ use super::{VoxelColumns, VoxelState, keys_from, voxels_from};
 pub struct History(pub u64);
 
 impl History {
-    /// The checksum after one more update, whose chunks sum up to `sum`.
+    /// Checksum after one more update, whose chunk sums add up to `sum`.
     pub fn then(self, sequence: u64, sum: u64) -> History {
         History(mix(self.0.wrapping_add(sequence).wrapping_add(sum)))
     }
 }
 
-/// Sum over a chunk of an update; that of all its chunks does not depend on their order.
+/// Sum over a chunk of an update; the total is independent of the order of chunks.
 pub fn changes_sum(voxels: &[(MortonKey, VoxelState)], removed: &[MortonKey]) -> u64 {
     let voxels = voxels.iter().map(|(key, state)| {
         let [x, y, z] = state.mean_offset.map(|v| u64::from(v.cast_unsigned()));
@@ -29,7 +29,7 @@ pub fn changes_sum(voxels: &[(MortonKey, VoxelState)], removed: &[MortonKey]) ->
     voxels.chain(removed).fold(0, u64::wrapping_add)
 }
 
-/// Notes in all chunks of an update what the map is after it; gives its checksum.
+/// Writes the checksum after an update into all its chunks, and returns it.
 pub fn sign(
     chunks: &mut [LatticeMapUpdate],
     before: History,

@@ -1,4 +1,4 @@
-//! Voxels cut into messages of bounded size.
+//! Voxels split into messages of bounded size.
 
 use lattice_core::lattice::{Lattice, MortonKey};
 use lattice_core::voxels::{Changes, Voxel, VoxelList, codec};
@@ -9,14 +9,14 @@ use serde_bytes::ByteBuf;
 use super::voxels::labels_of;
 use super::{KEY_ENCODING, MapStamp, info_of};
 
-/// Bytes of a chunk that are not voxels: header, info, lengths. Generous.
+/// Upper bound of a chunk's bytes besides voxels: header, info, lengths.
 const CHUNK_OVERHEAD_BYTES: usize = 1024;
 /// Count and mean offset of one voxel.
 const PAYLOAD_BYTES: usize = 4 + 3 * 2;
 /// Label and label count of one voxel.
 const LABEL_BYTES: usize = 2 + 4;
 
-/// Payload of the voxels of a chunk, empty where not kept.
+/// Payload of a chunk's voxels; columns are empty if not kept.
 #[derive(Default)]
 struct Payloads {
     counts: Vec<u32>,
@@ -41,7 +41,7 @@ impl Payloads {
     }
 }
 
-/// The whole list as self-contained chunks; an empty list is one chunk without voxels.
+/// Keyframe of a list as self-contained chunks; an empty list is one chunk without voxels.
 pub fn keyframe(list: &VoxelList, stamp: &MapStamp) -> Vec<LatticeMap> {
     let voxels = list.sorted();
     let keys: Vec<MortonKey> = voxels.iter().map(|(key, _)| *key).collect();
@@ -54,7 +54,7 @@ pub fn keyframe(list: &VoxelList, stamp: &MapStamp) -> Vec<LatticeMap> {
     })
 }
 
-/// The same of cells without payload.
+/// Keyframe of cells without payload.
 pub fn keyframe_of_cells(
     lattice: &Lattice,
     datum_m: Vector3<f64>,
@@ -97,7 +97,7 @@ fn keyframe_of_parts(
     (0..).zip(parts).map(chunk).collect()
 }
 
-/// Changes since `previous_sequence`, with the state of each changed voxel, in chunks.
+/// Update since `previous_sequence` with the state of each changed voxel, in chunks.
 pub fn update(
     list: &VoxelList,
     changes: &Changes,
@@ -113,7 +113,7 @@ pub fn update(
     update_of_parts(place, changes, bytes, previous_sequence, stamp, payloads)
 }
 
-/// The same of cells without payload.
+/// Update of cells without payload.
 pub fn update_of_cells(
     lattice: &Lattice,
     datum_m: Vector3<f64>,
@@ -172,7 +172,7 @@ fn update_of_parts(
     out
 }
 
-/// Unit of mean offsets: the farthest a point can be from its cell centre fits 16 bits.
+/// Unit of mean offsets: the covering radius of the cell fits 16 bits.
 fn offset_unit_m(lattice: &Lattice) -> f64 {
     lattice.covering_radius_m() / f64::from(i16::MAX)
 }
@@ -192,7 +192,7 @@ fn payload_bytes(list: &VoxelList) -> usize {
     }
 }
 
-/// Cuts sorted keys so that each part fits `chunk_bytes`; at least one part, of at least one key.
+/// Splits sorted keys so that each part fits `chunk_bytes`; at least one part, of at least one key.
 fn split(keys: &[MortonKey], payload_bytes: usize, chunk_bytes: usize) -> Vec<&[MortonKey]> {
     let room = chunk_bytes
         .saturating_sub(CHUNK_OVERHEAD_BYTES)

@@ -1,4 +1,4 @@
-//! Voxel lists as `LatticeMap` keyframes and `LatticeMapUpdate` deltas of bounded size.
+//! Conversion of voxel lists to `LatticeMap` keyframes and `LatticeMapUpdate` deltas of bounded size.
 
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::codec;
@@ -18,44 +18,44 @@ pub use voxels::{VoxelColumns, VoxelState, keys_from, main_label, voxels_from};
 
 use super::geometry;
 
-/// The one encoding of voxel keys: Morton-sorted 21-bit indices, LEB128 varints of differences.
+/// Supported key encoding: Morton-sorted 21-bit indices, LEB128 varints of differences.
 pub const KEY_ENCODING: &str = "morton21_delta_leb128";
 
-/// Tolerance of a generator, a cell volume and a quaternion, relative to their size.
+/// Relative tolerance of generator, cell volume and quaternion.
 const TOLERANCE: f64 = 1e-9;
 
-/// Error of a `LatticeMap` or `LatticeMapUpdate` that cannot be used.
+/// Reason for rejecting a `LatticeMap` or `LatticeMapUpdate`.
 #[derive(Debug, Error)]
 pub enum MapMessageError {
-    /// The lattice or its cell volume means nothing here.
+    /// Invalid lattice or cell volume.
     #[error("lattice '{lattice}' with cell volume {cell_volume_m3} m^3: {reason}")]
     Lattice {
         /// Name as sent.
         lattice: String,
         /// Cell volume as sent.
         cell_volume_m3: f64,
-        /// Problem in words.
+        /// What is wrong.
         reason: String,
     },
-    /// Keys in an encoding that this version does not read.
+    /// Unsupported key encoding.
     #[error("key encoding '{0}' is unknown, expected '{KEY_ENCODING}'")]
     Encoding(String),
-    /// Keys that do not decode.
+    /// Invalid keys.
     #[error("voxel keys: {0}")]
     Keys(#[from] codec::CodecError),
-    /// Columns of different length.
+    /// Column length that does not match the keys.
     #[error("{column} has {found} entries for {voxels} voxels, expected {expected}")]
     Length {
         /// Name of the column.
         column: &'static str,
-        /// Number of voxels that the keys give.
+        /// Number of keys.
         voxels: usize,
-        /// Entries there should be.
+        /// Expected number of entries.
         expected: usize,
-        /// Entries there are.
+        /// Number of entries.
         found: usize,
     },
-    /// Chunk number outside of the number of chunks.
+    /// Chunk index outside the number of chunks.
     #[error("chunk {chunk} of {chunks}")]
     Chunk {
         /// As sent, counted from zero.
@@ -63,29 +63,29 @@ pub enum MapMessageError {
         /// As sent.
         chunks: u32,
     },
-    /// The frame of the lattice in the map is not a pose.
+    /// Invalid lattice frame.
     #[error("map_from_lattice is not a pose: a number is not finite or the rotation is zero")]
     Frame,
 }
 
-/// Header and state that all messages of one map state share.
+/// Header and state common to all messages of one map state.
 pub struct MapStamp<'a> {
     /// Frame and time.
     pub header: Header,
-    /// Changes when the map is reset.
+    /// Epoch; it changes when the map is reset.
     pub epoch: u64,
-    /// State that the message describes.
+    /// Sequence number of the state.
     pub sequence: u64,
-    /// Checksum of the updates that led to it.
+    /// Checksum of the updates up to the state.
     pub history: History,
-    /// Geodetic origin of the map frame, where known.
+    /// Geodetic origin of the map frame, if known.
     pub origin: Option<&'a GeoPoint>,
-    /// Largest serialised chunk.
+    /// Largest serialized chunk, bytes.
     pub chunk_bytes: usize,
 }
 
-/// The lattice, its place in the map frame and the epoch, as a message: the generator in the
-/// lattice's own axes, which `map_from_lattice` turns.
+/// Lattice, its frame and the epoch as a message: the generator is in the
+/// lattice's own axes, which `map_from_lattice` rotates.
 pub fn info_of(lattice: &Lattice, datum_m: Vector3<f64>, stamp: &MapStamp) -> LatticeInfo {
     let g = lattice.unoriented_generator().transpose();
     let mut generator = [0.0; 9];
@@ -102,9 +102,9 @@ pub fn info_of(lattice: &Lattice, datum_m: Vector3<f64>, stamp: &MapStamp) -> La
     }
 }
 
-/// The lattice of a message, turned as it lies in the map, and its datum in the map frame.
+/// Lattice of a message, rotated into the map frame, and its datum in that frame.
 ///
-/// Refused if generator, name and cell volume do not agree; a custom lattice is that of its generator.
+/// Rejected if generator, name and cell volume disagree; a custom lattice is that of its generator.
 pub fn lattice_from(info: &LatticeInfo) -> Result<(Lattice, Vector3<f64>), MapMessageError> {
     let refuse = |reason: String| MapMessageError::Lattice {
         lattice: info.lattice.chars().take(32).collect(),
@@ -134,7 +134,7 @@ pub fn lattice_from(info: &LatticeInfo) -> Result<(Lattice, Vector3<f64>), MapMe
         geometry::isometry_from_pose(&info.map_from_lattice).ok_or(MapMessageError::Frame)?;
     let q = &info.map_from_lattice.orientation;
     let sent = Quaternion::new(q.w, q.x, q.y, q.z);
-    // As sent, to the bit, where it is of length 1 but for rounding.
+    // Bit-exact as sent, if its norm is 1 within rounding.
     let rotation = if (sent.norm_squared() - 1.0).abs() <= TOLERANCE {
         UnitQuaternion::new_unchecked(sent)
     } else {

@@ -1,4 +1,4 @@
-//! The voxels in the columns of a message.
+//! Voxels as columns of a message.
 
 use lattice_core::lattice::MortonKey;
 use lattice_core::registration::UNLABELED;
@@ -7,20 +7,20 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 
 use super::{KEY_ENCODING, MapMessageError};
 
-/// One voxel as a consumer sees it.
+/// Voxel as a consumer receives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoxelState {
-    /// Points that fell into the cell; 1 if they are not counted.
+    /// Points in the cell; 1 if they are not counted.
     pub count: u32,
-    /// Mean of the points from the cell centre, in units of the message.
+    /// Mean of the points relative to the cell centre, in units of the message.
     pub mean_offset: [i16; 3],
-    /// Most frequent label; [`UNLABELED`] if there is none.
+    /// Most frequent label; [`UNLABELED`] if none.
     pub label: u16,
     /// Points with that label.
     pub label_count: u32,
 }
 
-/// The columns of the voxels of a message, empty where not kept.
+/// Voxel columns of a message; empty if not kept.
 #[derive(Clone, Copy, Debug)]
 pub struct VoxelColumns<'a> {
     /// Encoding of the keys.
@@ -33,7 +33,7 @@ pub struct VoxelColumns<'a> {
     pub mean_offsets: &'a [i16],
     /// Most frequent labels.
     pub labels: &'a [u16],
-    /// Points with them.
+    /// Counts of these labels.
     pub label_counts: &'a [u32],
 }
 
@@ -63,7 +63,7 @@ impl<'a> From<&'a LatticeMapUpdate> for VoxelColumns<'a> {
     }
 }
 
-/// Voxels of a keyframe chunk or of the changed part of an update.
+/// Voxels of a keyframe chunk, or of the changed part of an update.
 pub fn voxels_from(
     columns: VoxelColumns,
     max_voxels: usize,
@@ -97,7 +97,7 @@ pub fn voxels_from(
     let offsets = columns.mean_offsets.chunks_exact(3);
     let offsets = offsets.map(|offset| <[i16; 3]>::try_from(offset).unwrap_or_default());
     let payloads = columns.counts.iter().copied().zip(offsets);
-    // Of a map of occupancy: one point at the centre.
+    // Occupancy maps have no payload: one point at the centre.
     let payloads = payloads.chain(std::iter::repeat((1, [0; 3])));
     let voxels = keys.into_iter().zip(payloads).zip(labels);
     Ok(voxels
@@ -136,8 +136,8 @@ pub(super) fn labels_of(list: &VoxelList, keys: &[MortonKey]) -> (Vec<u16>, Vec<
     labels.unzip()
 }
 
-/// The most frequent label of a cell, the smallest of equals, with its points; [`UNLABELED`] and 0 if
-/// no point of it has one.
+/// Most frequent label of a cell, the smallest of equals, with its count; [`UNLABELED`] and 0 if
+/// no point is labelled.
 pub fn main_label(list: &VoxelList, key: MortonKey) -> (u16, u32) {
     let labels = list
         .labels(key)

@@ -1,25 +1,24 @@
-//! Labels in the fields of a cloud, in any of the forms in use.
+//! Labels in cloud fields, in all supported conventions.
 
 use lattice_core::cloud::{CloudView, Datatype, PointField};
 use lattice_core::registration::{LabelDistribution, UNLABELED};
 
 use super::LabelOptions;
 
-/// Most fields `p_0`, `p_1`, ... that are looked for.
+/// Limit of fields `p_0`, `p_1`, ...
 const MAX_PROBABILITY_FIELDS: usize = 256;
-/// The colours and confidences of semantic_slam.
+/// Colour and confidence fields of semantic_slam.
 const COLORS: [[&str; 2]; 3] = [
     ["semantic_color1", "confidence1"],
     ["semantic_color2", "confidence2"],
     ["semantic_color3", "confidence3"],
 ];
 
-/// Field of a cloud that has the labels.
+/// Label field of a cloud.
 ///
-/// In this order, the first that is there: `label_probs` (one element for each class), `p_0`, `p_1`,
-/// ... (one field for each class), `label` with `confidence` if given; with a palette
-/// `semantic_color1` to `3` with `confidence1` to `3`, `semantic_color` with `confidence`, `rgb` or
-/// `rgba`.
+/// The first present of: `label_probs` (one element per class), `p_0`, `p_1`, ... (one field per class),
+/// `label` with optional `confidence`; with a palette also `semantic_color1` to `3` with `confidence1` to
+/// `3`, `semantic_color` with `confidence`, `rgb` or `rgba`.
 #[derive(Clone, Debug)]
 pub struct LabelReader<'a> {
     form: Form<'a>,
@@ -35,7 +34,7 @@ enum Form<'a> {
 }
 
 impl<'a> LabelReader<'a> {
-    /// Finds the labels; `None` if there are none.
+    /// Finds the label field; `None` if there is none.
     pub fn find(fields: &'a [PointField], options: &'a LabelOptions) -> Option<Self> {
         let form = form_of(fields, !options.palette.is_empty())?;
         Some(Self { form, options })
@@ -63,7 +62,7 @@ impl<'a> LabelReader<'a> {
         }
     }
 
-    /// The same class may come several times, of colours that mean the same.
+    /// Distribution of weights; a class may occur several times, for colours of the same class.
     fn distribution(&self, weights: impl IntoIterator<Item = (u16, f64)>) -> LabelDistribution {
         let weights = weights.into_iter().map(|(class, weight)| {
             let known = !self.options.ignored.contains(&class);
@@ -86,7 +85,7 @@ impl<'a> LabelReader<'a> {
 
     fn class_at(&self, view: &CloudView<'_>, field: &PointField, i: usize) -> u16 {
         let value = view.scalar(field, i);
-        // 255 in a byte is the same as 65535.
+        // 255 in a byte corresponds to 65535.
         let is_byte = Datatype::from_code(field.datatype) == Some(Datatype::Uint8);
         if !(value >= 0.0 && value.fract() == 0.0) || (is_byte && value == 255.0) {
             return UNLABELED;
@@ -141,7 +140,7 @@ fn form_of(fields: &[PointField], has_palette: bool) -> Option<Form<'_>> {
     Some(Form::Colors(vec![(color, None)]))
 }
 
-/// The confidence of a point, 1 where the cloud has none.
+/// Confidence of a point, 1 without a confidence field.
 fn confidence_at(view: &CloudView<'_>, field: Option<&PointField>, i: usize) -> f64 {
     field.map_or(1.0, |field| view.scalar(field, i))
 }

@@ -1,6 +1,6 @@
-//! PointCloud2 with labels and the core's [`SemanticCloud`].
+//! Conversion between labelled PointCloud2 and the core's [`SemanticCloud`].
 //!
-//! There is no standard for labels in a cloud; [`LabelReader`] knows the fields that are in use.
+//! Labels in clouds have no standard; [`LabelReader`] supports the conventions in use.
 
 mod fields;
 mod options;
@@ -18,19 +18,19 @@ use thiserror::Error;
 use super::cloud;
 use super::viewpoint::viewpoint_of;
 
-/// Way of a sensor during a cloud that still has one viewpoint, m.
+/// Largest sensor movement during a cloud with a single viewpoint, m.
 const MAX_MOVED_M: f64 = 0.1;
 
-/// Error of a cloud that cannot be used.
+/// Reason for rejecting a cloud.
 #[derive(Debug, Error)]
 pub enum SemanticError {
-    /// The bytes are not what the header says, or there are too many points.
+    /// The data do not match the header, or there are too many points.
     #[error(transparent)]
     Cloud(#[from] CloudError),
-    /// Nothing in it.
+    /// Empty cloud.
     #[error("the cloud has no points")]
     Empty,
-    /// Nothing that is a place.
+    /// No usable point.
     #[error(
         "none of the {points} points is finite and within {max_range_m} m of the origin of the headset"
     )]
@@ -40,7 +40,7 @@ pub enum SemanticError {
         /// The limit.
         max_range_m: f64,
     },
-    /// No field of a known form.
+    /// No label field.
     #[error(
         "the cloud has no labels: there is no field label, label_probs, p_0, semantic_color or \
          semantic_color1 among {found} (colours need `palette_rgb_class`)"
@@ -49,7 +49,7 @@ pub enum SemanticError {
         /// Names of its fields.
         found: String,
     },
-    /// A field, but nothing in it.
+    /// No labelled point.
     #[error("none of the {points} points has a label of a known class")]
     AllUnlabelled {
         /// Points of the cloud.
@@ -57,22 +57,22 @@ pub enum SemanticError {
     },
 }
 
-/// Numbers of points left out of a cloud.
+/// Numbers of rejected and unlabelled points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SemanticReport {
     /// Points of the message.
     pub points: usize,
-    /// Left out: NaN or infinite.
+    /// Rejected: NaN or infinite.
     pub not_finite: usize,
-    /// Left out: farther from the origin than the limit.
+    /// Rejected: farther from the origin than the limit.
     pub too_far: usize,
-    /// Kept, but of no known class.
+    /// Kept, but without a known class.
     pub unlabelled: usize,
 }
 
-/// Reads a cloud and brings it to the axes of ROS.
+/// Converts a cloud to the axes of ROS.
 ///
-/// Without labels in the message the cloud has none, unless they are required.
+/// A message without labels gives an unlabelled cloud, unless labels are required.
 pub fn semantic_from_message(
     message: &PointCloud2,
     options: &SemanticOptions,
@@ -142,7 +142,7 @@ fn semantic_from_view(
     Ok((semantic, report))
 }
 
-/// Reads a cloud of a headset as [`semantic_from_message`] does, and from where it was seen.
+/// Converts a headset cloud as [`semantic_from_message`] does, with its viewpoint.
 pub fn headset_scan_from_message(
     message: &PointCloud2,
     options: &SemanticOptions,
@@ -155,8 +155,8 @@ pub fn headset_scan_from_message(
     Ok((SourceCloud { cloud, sensor_m }, report))
 }
 
-/// The most probable class of each point of a message, in its order, NaN points included; `None` if
-/// it has no labels.
+/// Most probable class of each point of a message, in its order, NaN points included; `None` without
+/// labels.
 pub fn labels_from_message(
     message: &PointCloud2,
     max_points: usize,

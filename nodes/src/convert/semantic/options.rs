@@ -1,4 +1,4 @@
-//! Options for reading labelled clouds.
+//! Options for labelled clouds.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,15 +9,15 @@ use lattice_runtime::params::{ParamError, Params};
 /// Red, green and blue.
 pub type Color = [u8; 3];
 
-/// Meaning of labels and colours.
+/// Mapping of labels and colours to classes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelOptions {
-    /// True if only the low 16 bits of a label of 32 bits are the class (SemanticKITTI, where the
-    /// others are the instance).
+    /// True if the class is the low 16 bits of a 32-bit label (SemanticKITTI, whose high bits
+    /// are the instance).
     pub low_16_bits: bool,
-    /// Classes that say nothing, as the 0 of SemanticKITTI.
+    /// Classes treated as unlabelled, such as 0 in SemanticKITTI.
     pub ignored: BTreeSet<u16>,
-    /// Class of a colour, for clouds whose labels are colours.
+    /// Class of each colour, for coloured labels.
     pub palette: BTreeMap<Color, u16>,
 }
 
@@ -47,7 +47,7 @@ impl LabelOptions {
     }
 }
 
-/// `palette_rgb_class`: classes of colours.
+/// Reads `palette_rgb_class`: classes of colours.
 pub fn palette_from_params(params: &Params) -> Result<BTreeMap<Color, u16>, ParamError> {
     let palette = params.i64_array("palette_rgb_class", &[])?;
     palette_from(&palette).ok_or_else(|| {
@@ -67,16 +67,16 @@ fn palette_from(numbers: &[i64]) -> Option<BTreeMap<Color, u16>> {
     rest.is_empty().then(|| entries.collect()).flatten()
 }
 
-/// Options for reading the cloud of a headset.
+/// Options for headset clouds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SemanticOptions {
-    /// Most points of one cloud.
+    /// Limit of points per cloud.
     pub max_points: usize,
-    /// Points farther from the origin are left out, m.
+    /// Points farther from the origin are rejected, m.
     pub max_range_m: f64,
-    /// Axes of the sender.
+    /// Axis convention of the sender.
     pub axes: Axes,
-    /// True if clouds without labels are refused.
+    /// True to reject clouds without labels.
     pub require_labels: bool,
     /// Meaning of labels.
     pub labels: LabelOptions,
@@ -95,8 +95,8 @@ impl Default for SemanticOptions {
 }
 
 impl SemanticOptions {
-    /// Reads `max_cloud_points`, `max_range_m`, `headset_axes`, `require_labels` and what
-    /// [`LabelOptions`] has.
+    /// Reads `max_cloud_points`, `max_range_m`, `headset_axes`, `require_labels` and the
+    /// parameters of [`LabelOptions`].
     pub fn from_params(params: &Params) -> Result<Self, ParamError> {
         let defaults = Self::default();
         let axes = params.string("headset_axes", defaults.axes.name())?;

@@ -1,4 +1,4 @@
-//! Clouds with labels as messages.
+//! Labelled clouds as messages.
 
 use lattice_core::registration::{SemanticCloud, UNLABELED};
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
@@ -7,7 +7,7 @@ use lattice_msgs::std_msgs::Header;
 use super::Color;
 use crate::convert::cloud::{dense_cloud, field, xyz_fields};
 
-/// x, y, z, rgb, label, confidence.
+/// Bytes per point: x, y, z, rgb, label, confidence.
 const POINT_STEP: u32 = 22;
 
 /// Points in the frame of `header` with the most probable class of each as `label` (uint16), its
@@ -34,10 +34,10 @@ pub fn message_from_semantic(header: Header, cloud: &SemanticCloud) -> PointClou
     dense_cloud(header, fields, POINT_STEP, cloud.len(), data)
 }
 
-/// A colour for a class, far from those of the classes next to it; grey for no class.
+/// Colour of a class, distinct from those of adjacent class numbers; grey for no class.
 ///
-/// Bits of the number set the brightest bits of red, green and blue in turn, as the colour map of
-/// Pascal VOC does; class 0, black there, gets the colour of 256.
+/// Bits of the number set the highest bits of red, green and blue in turn, as in the colour map of
+/// Pascal VOC; class 0, black there, has the colour of 256.
 pub fn color_of(class: u16) -> Color {
     if class == UNLABELED {
         return [128; 3];

@@ -1,4 +1,4 @@
-//! Centres of the occupied cells.
+//! Export of the centres of occupied cells.
 
 use std::io::Write;
 

@@ -1,4 +1,4 @@
-//! Labelled clouds.
+//! Export of labelled clouds.
 
 use std::io::{self, BufWriter, Write};
 
@@ -7,8 +7,8 @@ use nalgebra::Point3;
 use super::ply_header;
 
 /// Writes points as vertices of a binary PLY file: `x`, `y`, `z` (double, metres) and `label`
-/// (ushort, 65535 for none, also for points beyond the labels). `comment` is one line that says in
-/// which frame they are.
+/// (ushort, 65535 for none, also for points beyond the labels). `comment` is one line that names
+/// their frame.
 pub fn write_labelled_ply(
     points_m: &[Point3<f64>],
     labels: &[u16],

@@ -1,4 +1,4 @@
-//! The surface of the occupied cells.
+//! Export of the surface of occupied cells.
 
 use std::io::{BufWriter, Write};
 
@@ -12,8 +12,8 @@ use super::{ExportError, HeightRange, color_at, comment, ply_header};
 
 /// Writes the faces between occupied and empty cells as a binary PLY mesh of convex polygons.
 ///
-/// Corners where cells meet are one vertex: `x`, `y`, `z` (double, metres, map frame), coloured by
-/// height. Polygons turn counter-clockwise seen from the empty side. Equal maps give equal bytes.
+/// Shared corners are one vertex: `x`, `y`, `z` (double, metres, map frame), coloured by
+/// height. Polygons are counter-clockwise seen from the empty side. Equal maps give equal bytes.
 pub fn write_mesh_ply(list: &VoxelList, writer: impl Write) -> Result<(), ExportError> {
     let mesh = Mesh::of(list)?;
     let heights = HeightRange::of(mesh.vertices_m.iter().map(|v| v.z));
@@ -38,7 +38,7 @@ pub fn write_mesh_ply(list: &VoxelList, writer: impl Write) -> Result<(), Export
 struct Mesh {
     vertices_m: Vec<Vector3<f64>>,
     faces: usize,
-    /// Each with its length, as PLY has them.
+    /// Polygons with their lengths, in PLY form.
     polygons: Vec<u8>,
 }
 

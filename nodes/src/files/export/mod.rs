@@ -1,4 +1,4 @@
-//! Maps for other programs and for people: centres as PLY, PCD or text, a PLY mesh of cells, octrees.
+//! Map export: centres as PLY, PCD or text, a PLY mesh of cells, octrees.
 
 mod centers;
 mod cloud;
@@ -18,19 +18,19 @@ pub use pcd::write_centers_pcd;
 use lattice_core::voxels::VoxelList;
 use thiserror::Error;
 
-/// Reason for which a map was not exported.
+/// Reason for a failed export.
 #[derive(Debug, Error)]
 pub enum ExportError {
     /// The system could not write.
     #[error("writing failed: {0}")]
     Io(#[from] std::io::Error),
-    /// PLY counts vertices in 32 bits with sign.
+    /// Vertex count above the limit of PLY, a signed 32-bit number.
     #[error(
         "the mesh has more than {} vertices: export the centres, or take larger cells",
         i32::MAX
     )]
     TooManyVertices,
-    /// An octree has 65536 voxels on a side, with its middle at the origin.
+    /// Cell outside an octree, which has 65536 voxels per edge, centred at the origin.
     #[error(
         "the cell at {center_m:.1?} m is outside an octree of these cells, which reaches {limit_m} m from the \
          origin of the map: take larger cells, or a part of the map by `lattice map crop`"
@@ -43,10 +43,10 @@ pub enum ExportError {
     },
 }
 
-/// An element: its name, how many there are, and the type and name of each property.
+/// PLY element: name, count, and type and name of each property.
 type PlyElement<'a> = (&'a str, u64, &'a [&'a str]);
 
-/// The header of a binary little-endian PLY file, with one line of comment.
+/// Header of a binary little-endian PLY file, with one line of comment.
 pub fn ply_header(comment: &str, elements: &[PlyElement]) -> String {
     let comment = comment.replace(['\n', '\r'], " ");
     let mut header = format!("ply\nformat binary_little_endian 1.0\ncomment {comment}\n");
@@ -59,7 +59,7 @@ pub fn ply_header(comment: &str, elements: &[PlyElement]) -> String {
     header + "end_header\n"
 }
 
-/// The comment of a header that says what the map is.
+/// Header comment that describes the map.
 fn comment(list: &VoxelList) -> String {
     let lattice = list.lattice();
     format!(

@@ -1,4 +1,4 @@
-//! OctoMap's binary tree of the occupied space.
+//! Export of occupied space as OctoMap's binary tree.
 
 use std::io::{BufWriter, Write};
 
@@ -9,23 +9,23 @@ use super::ExportError;
 
 /// Levels of the tree below its root.
 const LEVELS: u32 = 16;
-/// Voxels of the tree on each side of its middle.
+/// Voxels on each side of the tree's centre.
 const HALF: i64 = 1 << (LEVELS - 1);
 
-/// Numbers of a tree that was written.
+/// Size of a written tree.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct OctreeSummary {
-    /// Edge of the voxels, metres.
+    /// Voxel edge, metres.
     pub resolution_m: f64,
-    /// Occupied voxels of that edge.
+    /// Number of occupied voxels.
     pub voxels: usize,
 }
 
-/// Writes the occupied space as a binary tree (`.bt`) of OctoMap; what is not occupied is unknown.
+/// Writes the occupied space as a binary tree (`.bt`) of OctoMap; all other space is unknown.
 ///
-/// Voxels of the tree have half the cell size as their edge, and are occupied if their centre lies in an
-/// occupied cell. Cells of the cubic lattice are eight voxels each, without error: an octree has its corners
-/// where that lattice has centres, so that voxels of the whole cell size would not fit.
+/// The voxel edge is half the cell size; a voxel is occupied if its centre lies in an
+/// occupied cell. A cubic cell is exactly eight voxels: an octree has corners
+/// where that lattice has centres, so voxels of the full cell size would not align.
 pub fn write_octree(list: &VoxelList, writer: impl Write) -> Result<OctreeSummary, ExportError> {
     let resolution_m = list.lattice().cell_side_m() / 2.0;
     let codes = occupied(list, resolution_m)?;
@@ -50,10 +50,10 @@ pub fn write_octree(list: &VoxelList, writer: impl Write) -> Result<OctreeSummar
     })
 }
 
-/// Places of the occupied voxels in the order of the tree: three bits for each level.
+/// Occupied voxels in tree order: three bits per level.
 fn occupied(list: &VoxelList, resolution_m: f64) -> Result<Vec<u64>, ExportError> {
     let lattice = list.lattice();
-    // Half the extent of a cell, on each axis.
+    // Half the extent of a cell on each axis.
     let reach_m = (lattice.cell().vertices.iter()).fold(Vector3::zeros(), |reach, vertex| {
         Vector3::sup(&reach, &vertex.abs())
     });
@@ -94,7 +94,7 @@ fn occupied(list: &VoxelList, resolution_m: f64) -> Result<Vec<u64>, ExportError
     Ok(codes)
 }
 
-/// Bits of x, y and z of each level in turn, x lowest.
+/// Interleaved bits of x, y and z for each level, x lowest.
 fn code(voxel: [u64; 3]) -> u64 {
     (0..LEVELS).fold(0, |code, level| {
         let [x, y, z] = voxel.map(|v| v >> level & 1);
@@ -105,12 +105,12 @@ fn code(voxel: [u64; 3]) -> u64 {
 #[derive(Default)]
 struct Tree {
     nodes: u64,
-    /// Two bytes for each inner node, depth first.
+    /// Two bytes per inner node, depth first.
     data: Vec<u8>,
 }
 
 impl Tree {
-    /// Adds an inner node with `levels` below it, and what is below, of its occupied voxels.
+    /// Adds an inner node with `levels` below it, and its descendants, from its occupied voxels.
     fn add(&mut self, codes: &[u64], levels: u32) {
         let below = levels.saturating_sub(1);
         let child_of = |code: &u64| code >> (3 * below) & 7;

@@ -1,15 +1,15 @@
-//! Colour by height.
+//! Colour map by height.
 
 /// OKLab lightness of the lowest and the highest colour.
 const LIGHTNESS: [f64; 2] = [0.46, 0.91];
 /// OKLab hue of the lowest and the highest colour, degrees: blue to yellow.
 const HUE_DEG: [f64; 2] = [272.0, 95.0];
-/// OKLab chroma where the screen has it.
+/// OKLab chroma, if in the gamut.
 const CHROMA: f64 = 0.135;
 
 /// sRGB colour for a fraction of the height range, dark blue for 0 to yellow for 1.
 ///
-/// Lightness and hue change evenly in OKLab (Ottosson 2020), so that equal steps look equal.
+/// Lightness and hue are linear in OKLab (Ottosson 2020), so that equal steps look equal.
 pub fn color_at(fraction: f64) -> [u8; 3] {
     linear_at(fraction).map(srgb)
 }
@@ -26,16 +26,16 @@ pub fn linear_at(fraction: f64) -> [f64; 3] {
     on_screen(lightness, hue)
 }
 
-/// sRGB colour of one of a row of things that have no order: neighbours in the row are far apart.
+/// sRGB colour of an unordered category; consecutive indices have distant hues.
 pub fn category_color(index: usize) -> [u8; 3] {
-    /// Degrees: the golden angle, so that any first few hues are spread.
+    /// Golden angle in degrees, which spreads any first few hues.
     const TURN_DEG: f64 = 137.507_764;
     let lightness = [0.70, 0.56, 0.82][index % 3];
     let hue = (30.0 + index as f64 * TURN_DEG).rem_euclid(360.0);
     on_screen(lightness, hue.to_radians()).map(srgb)
 }
 
-/// Linear light of an OKLab lightness and hue (rad), as much coloured as the screen can.
+/// Linear light of an OKLab lightness and hue (rad), with the largest chroma in the gamut.
 fn on_screen(lightness: f64, hue: f64) -> [f64; 3] {
     let mut chroma = CHROMA;
     loop {
@@ -48,7 +48,7 @@ fn on_screen(lightness: f64, hue: f64) -> [f64; 3] {
     }
 }
 
-/// OKLab to linear sRGB; the constants are those of the definition.
+/// OKLab to linear sRGB, with the constants of the definition.
 fn oklab_to_linear(l: f64, a: f64, b: f64) -> [f64; 3] {
     let cube = |v: f64| v * v * v;
     let l_ = cube(l + 0.396_337_777_4 * a + 0.215_803_757_3 * b);
@@ -82,7 +82,7 @@ pub fn linear(srgb: u8) -> f64 {
     }
 }
 
-/// The heights that the colours span, without the outermost hundredth on either side.
+/// Height range of the colour map, without the outer hundredth on either side.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HeightRange {
     low_m: f64,
@@ -90,7 +90,7 @@ pub struct HeightRange {
 }
 
 impl HeightRange {
-    /// Of heights in metres; those that are not finite do not count.
+    /// Range of heights in metres, ignoring those that are not finite.
     pub fn of(heights_m: impl IntoIterator<Item = f64>) -> HeightRange {
         let mut heights: Vec<f64> = heights_m.into_iter().filter(|h| h.is_finite()).collect();
         let low = heights.len() / 100;
@@ -108,7 +108,7 @@ impl HeightRange {
         }
     }
 
-    /// Place of a height in the range, 0 to 1; 0.5 if all heights are one.
+    /// Fraction of a height in the range, 0 to 1; 0.5 if all heights are equal.
     pub fn fraction(&self, height_m: f64) -> f64 {
         let span = self.high_m - self.low_m;
         if span > 0.0 {

@@ -1,4 +1,4 @@
-//! Centres of the occupied cells as a PCD file.
+//! Export of the centres of occupied cells as PCD.
 
 use std::io::{BufWriter, Write};
 
@@ -7,7 +7,7 @@ use lattice_core::voxels::VoxelList;
 
 use super::ExportError;
 
-/// Coordinates below this are written in single precision, which errs by less than 0.5 mm there, m.
+/// Coordinates below this are written in single precision, with an error below 0.5 mm, m.
 const SINGLE_M: f64 = 8192.0;
 
 /// Writes the occupied cells in Morton order as a binary PCD file.

@@ -1,21 +1,21 @@
-//! Corners that neighbouring cells share, found once for a lattice and then exact.
+//! Shared corners of adjacent cells, identified once per lattice and then exactly.
 
 use lattice_core::lattice::{Lattice, LatticeIndex};
 use nalgebra::Vector3;
 
-/// Corners nearer than this, relative to the covering radius, are one.
+/// Corners closer than this, relative to the covering radius, are equal.
 const SAME: f64 = 1e-6;
 
-/// A name for every point where cells meet, the same from whichever of the cells it is asked.
+/// Unique identifier of every corner, independent of the cell it is looked up from.
 #[derive(Clone, Debug)]
 pub struct SharedVertices {
-    /// For each corner of the cell at 0: among all cells that have it, the one of lowest index, and
-    /// the number of the corner there.
+    /// For each corner of cell 0: the adjacent cell of lowest index, and the corner's number in
+    /// that cell.
     owners: Vec<(LatticeIndex, u16)>,
 }
 
 impl SharedVertices {
-    /// Compares the corners of a cell with those of all cells that it touches.
+    /// Matches the corners of a cell with those of all touching cells.
     pub fn new(lattice: &Lattice) -> SharedVertices {
         let corners = &lattice.cell().vertices;
         let limit_m = SAME * lattice.covering_radius_m();
@@ -36,7 +36,7 @@ impl SharedVertices {
         }
     }
 
-    /// The name of a corner of the cell `w`: a cell and the number of the corner there.
+    /// Identifier of a corner of cell `w`: a cell and the corner's number in it.
     ///
     /// `None` if there is no such corner.
     pub fn name(&self, [x, y, z]: LatticeIndex, corner: u16) -> Option<(LatticeIndex, u16)> {

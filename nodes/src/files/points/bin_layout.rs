@@ -1,13 +1,13 @@
-//! Columns of raw binary scans, and which of them a file without a header may have.
+//! Column layouts of raw binary scans, and their detection in a file without a header.
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::scalar::Scalar;
 
-/// Most columns.
+/// Limit of columns.
 const MAX_COLUMNS: usize = 64;
-/// Layouts that are tried where none is stated: those of KITTI, nuScenes (5), with normals or colours (6 to 8), and doubles.
+/// Layouts tried if none is given: KITTI, nuScenes (5), with normals or colours (6 to 8), and doubles.
 const KNOWN: [BinLayout; 8] = [
     BinLayout::KITTI,
     BinLayout::floats(3),
@@ -18,23 +18,23 @@ const KNOWN: [BinLayout; 8] = [
     BinLayout::doubles(3),
     BinLayout::doubles(4),
 ];
-/// Coordinates beyond these lengths are none of a scan, m.
+/// Plausible absolute coordinates of a scan, m.
 const COORDINATES_M: std::ops::RangeInclusive<f64> = 1e-12..=1e7;
-/// Share of points with such coordinates in a sample above which a layout is not that of the file.
+/// Largest fraction of points with implausible coordinates for an accepted layout.
 const MAX_ABSURD: f64 = 0.01;
-/// Share of points on the y axis above which numbers are halves of doubles.
+/// Fraction of points on the y axis above which the numbers are halves of doubles.
 const MOST_HALVES: f64 = 0.5;
-/// Columns of a wrong layout are mixtures of the true ones and much alike. A layout is refused if another one explains
-/// this share of the variance of the numbers more, and this many times as much: scans of KITTI explain 67 % by their four
-/// columns and the same by eight, other layouts by four at most two thirds of what they explain by their own.
+/// Margin between layouts. The columns of a wrong layout mix the true ones and are similar. A layout is rejected if
+/// another one explains this fraction of the variance more, and this many times as much. Scans of KITTI explain 67 %
+/// by four columns and equally by eight; other layouts explain at most two thirds of their own value by four.
 const MORE: f64 = 0.05;
 const TIMES: f64 = 1.4;
-/// Share of what the best layout explains below which another one is not named.
+/// Fraction of the best explained variance below which an alternative layout is not suggested.
 const WORTH_NAMING: f64 = 0.5;
-/// Fewest numbers of a sample by which layouts are told apart.
+/// Smallest sample size for distinguishing layouts, numbers.
 const MIN_NUMBERS: usize = 256;
 
-/// Columns of a `.bin` file: records of this many little-endian numbers, x, y and z (m) first.
+/// Columns of a `.bin` file: records of little-endian numbers, x, y and z (m) first.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct BinLayout {
     pub(super) columns: usize,
@@ -94,9 +94,9 @@ impl fmt::Display for BinLayout {
     }
 }
 
-/// Checks that a file may be a scan of KITTI; the reason if not, and the layouts that fit.
+/// Checks whether a file may be a KITTI scan; the error names the reason and the layouts that fit.
 ///
-/// `sample` is its beginning, `size_bytes` its length where that is known.
+/// `sample` is its beginning, `size_bytes` its length if known.
 pub(super) fn check_kitti(sample: &[u8], size_bytes: Option<u64>) -> Result<(), String> {
     let fit = |layout: BinLayout| Fit::new(layout, sample, size_bytes);
     let own = fit(BinLayout::KITTI);
@@ -107,17 +107,17 @@ pub(super) fn check_kitti(sample: &[u8], size_bytes: Option<u64>) -> Result<(), 
             && other.explained > TIMES * own.explained
     };
     let why = if let Some(size_bytes) = size_bytes.filter(|_| !own.divides) {
-        format!("its {size_bytes} bytes are no whole number of points of 4 floats (16 bytes)")
+        format!("its {size_bytes} bytes are not a multiple of a point of 4 floats (16 bytes)")
     } else if own.absurd > MAX_ABSURD {
         let percent = 100.0 * own.absurd;
-        format!("as 4 floats a point, {percent:.0} % of its points have no possible coordinates")
+        format!("as 4 floats a point, {percent:.0} % of its points have implausible coordinates")
     } else if others.iter().any(|other| is_alike(&other)) {
-        "as 4 floats a point, all its columns are alike".to_owned()
+        "as 4 floats a point, all its columns are similar".to_owned()
     } else {
         return Ok(());
     };
     let as_kitti = match own.divides {
-        true => "; `--columns 4` reads it all the same",
+        true => "; `--columns 4` reads it anyway",
         false => "",
     };
     let mut fitting: Vec<&Fit> = others.iter().filter(|other| other.is_possible()).collect();
@@ -141,14 +141,14 @@ pub(super) fn check_kitti(sample: &[u8], size_bytes: Option<u64>) -> Result<(), 
     })
 }
 
-/// A layout held against a file.
+/// Fit of a layout to a file.
 struct Fit {
     layout: BinLayout,
-    /// True if the file is a whole number of points, as far as its length is known.
+    /// True if the file length is a multiple of the record length, as far as known.
     divides: bool,
-    /// Share of the points of the sample with impossible coordinates.
+    /// Fraction of sample points with implausible coordinates.
     absurd: f64,
-    /// Share of the variance of the numbers that the columns explain.
+    /// Fraction of the variance explained by the columns.
     explained: f64,
 }
 
@@ -164,7 +164,7 @@ impl Fit {
         let share = |is: fn(&[f64]) -> bool| {
             points.clone().filter(|point| is(point)).count() as f64 / count
         };
-        // Some writers keep rays without return as NaN.
+        // Some writers store rays without return as NaN.
         let is_absurd = |point: &[f64]| {
             let axes = point.get(..3).unwrap_or_default();
             !axes.iter().all(|c| c.is_nan())
@@ -172,7 +172,7 @@ impl Fit {
                     .iter()
                     .any(|c| *c != 0.0 && !COORDINATES_M.contains(&c.abs()))
         };
-        // The lower halves of short doubles are 0: x and z of all points if they are read as floats.
+        // The lower halves of short doubles are 0: read as floats, x and z of all points are 0.
         let is_half =
             |point: &[f64]| matches!(point, [x, y, z, ..] if *x == 0.0 && *y != 0.0 && *z == 0.0);
         let halves = Some(share(is_half)).filter(|share| *share > MOST_HALVES);
@@ -192,8 +192,8 @@ impl Fit {
     }
 }
 
-/// Share of the variance of numbers that is between columns (correlation ratio), of their magnitudes or of their
-/// values, whichever is larger; both in logarithms, so that no unit outweighs the others.
+/// Correlation ratio: fraction of the variance between columns, of magnitudes or of
+/// values, whichever is larger; both in logarithms, so that units have no weight.
 fn explained(numbers: &[f64], columns: usize) -> f64 {
     let magnitude = |v: f64| (v.abs() + 1e-3).ln();
     let ratios = [magnitude, f64::asinh].map(|feature| {
@@ -266,10 +266,10 @@ mod tests {
             );
         }
         let doubles = checked(BinLayout::doubles(3)).unwrap_err();
-        assert!(doubles.contains("no possible coordinates"), "{doubles}");
+        assert!(doubles.contains("implausible coordinates"), "{doubles}");
         let five = checked(BinLayout::floats(5)).unwrap_err();
         assert!(
-            five.contains("columns are alike; 5 floats (`--columns 5`) would fit"),
+            five.contains("columns are similar; 5 floats (`--columns 5`) would fit"),
             "{five}"
         );
     }

@@ -1,24 +1,24 @@
-//! The points found so far.
+//! Collection of points while reading.
 
 use lattice_core::registration::UNLABELED;
 
 use super::PointFileError;
 
-/// Room that is made on the word of a header alone, points.
+/// Limit of memory reserved from the point count of a header, points.
 const TRUSTED: u64 = 1 << 16;
 
-/// Most points of one place in a drawing: eight boxes meet in a corner, with three faces each.
+/// Limit of equal points in a drawing: eight boxes meet in a corner, with three faces each.
 const MAX_CORNER: usize = 24;
 
-/// Takes points up to a limit, and leaves out those that are not finite.
+/// Collects points up to a limit, and skips those that are not finite.
 pub(super) struct Collector {
     pub(super) points_m: Vec<[f64; 3]>,
-    /// One for each point, or none at all.
+    /// One per point, or empty.
     pub(super) labels: Vec<u16>,
     pub(super) skipped: usize,
-    /// True if the points are rows and columns of a sensor.
+    /// True for rows and columns of a sensor.
     pub(super) is_organized: bool,
-    /// Statement of the file about its points that is not applied.
+    /// Warning about a property of the file that is not applied.
     pub(super) remark: Option<String>,
     max_points: usize,
 }
@@ -35,7 +35,7 @@ impl Collector {
         }
     }
 
-    /// Fails early if a header promises more points than are allowed.
+    /// Fails early if a header states more points than the limit.
     pub(super) fn promise(&mut self, points: u64) -> Result<(), PointFileError> {
         if usize::try_from(points).is_ok_and(|points| points <= self.max_points) {
             self.points_m.reserve(points.min(TRUSTED) as usize);
@@ -45,13 +45,13 @@ impl Collector {
         Err(PointFileError::TooManyPoints { points, max_points })
     }
 
-    /// The same for points beside those that were found.
+    /// Fails early if further points would exceed the limit.
     pub(super) fn promise_more(&mut self, points: u64) -> Result<(), PointFileError> {
         let found = self.points_m.len().saturating_add(self.skipped) as u64;
         self.promise(found.saturating_add(points))
     }
 
-    /// Takes a point, metres.
+    /// Adds a point, metres.
     pub(super) fn push(&mut self, point_m: [f64; 3]) -> Result<(), PointFileError> {
         let found = self.points_m.len().saturating_add(self.skipped);
         if found >= self.max_points {
@@ -68,8 +68,8 @@ impl Collector {
         Ok(())
     }
 
-    /// Leaves out points at 0 0 0, which drivers write for rays without return; their number. Some are kept where rows and
-    /// columns of a sensor do not tell that they are none: they may be a corner of a drawing.
+    /// Removes points at 0 0 0, which drivers write for rays without return; returns their number. A few are kept in
+    /// unorganised clouds: they may be a corner of a drawing.
     pub(super) fn leave_out_no_returns(&mut self) -> usize {
         let is_none = |point_m: &[f64; 3]| *point_m == [0.0; 3];
         let count = self
@@ -87,7 +87,7 @@ impl Collector {
         count
     }
 
-    /// Lines on what is left out or not applied.
+    /// Warnings about removed points and properties not applied.
     pub(super) fn notes(&self, no_returns: usize) -> impl Iterator<Item = String> + '_ {
         let of = self.points_m.len().saturating_add(no_returns);
         let left_out = (no_returns > 0).then(|| {
@@ -96,7 +96,7 @@ impl Collector {
         left_out.into_iter().chain(self.remark.clone())
     }
 
-    /// Takes a point with its label; all points of a file have one or none has.
+    /// Adds a labelled point; either all points of a file are labelled or none.
     pub(super) fn push_labelled(
         &mut self,
         point_m: [f64; 3],
@@ -110,8 +110,8 @@ impl Collector {
         Ok(())
     }
 
-    /// Takes a point with the label that a file has for it, if it has labels; what is no class number is
-    /// no label.
+    /// Adds a point with its label if the file has labels; an invalid class number counts as
+    /// unlabelled.
     pub(super) fn push_with(
         &mut self,
         point_m: [f64; 3],

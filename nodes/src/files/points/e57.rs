@@ -1,4 +1,4 @@
-//! E57 files (ASTM E2807): the scans in the frame of the file, as their poses place them.
+//! E57 files (ASTM E2807): the scans in the file's frame, transformed by their poses.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -10,7 +10,7 @@ use ::e57::{CartesianCoordinate, E57Reader};
 use super::collect::Collector;
 use super::{BUFFER, PointFileError, PointFormat};
 
-/// Reads all scans of a file; points that it calls invalid are left out and counted.
+/// Reads all scans of a file; points marked invalid are skipped and counted.
 pub(super) fn read(path: &Path, points: &mut Collector) -> Result<PointFormat, PointFileError> {
     let io = |source| PointFileError::Io { byte: 0, source };
     let file = BufReader::with_capacity(BUFFER, File::open(path).map_err(io)?);

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::PointFormat;
 
-/// Error of a point file. Bytes count from 0, lines from 1, both after unpacking.
+/// Reason for rejecting a point file. Bytes count from 0, lines from 1, both after decompression.
 #[derive(Debug, Error)]
 pub enum PointFileError {
     /// The system could not open or read the file, or its bzip2 data is damaged.
@@ -17,7 +17,7 @@ pub enum PointFileError {
         /// Error of the system.
         source: io::Error,
     },
-    /// Neither the content nor the name tells what it is.
+    /// Unknown format by content and extension.
     #[error(
         "cannot tell the format from the content or the extension {extension:?}: \
          name the file .ply, .pcd, .las, .laz, .e57, .bt, .xyz, .txt, .csv or .bin, followed by .bz2 if packed"
@@ -26,27 +26,27 @@ pub enum PointFileError {
         /// The extension, without .bz2.
         extension: String,
     },
-    /// A line of a header or of text data is wrong.
+    /// Invalid line of a header or of text data.
     #[error("{format} file, line {line}: {reason}")]
     Line {
-        /// Kind that the file was read as.
+        /// Format used for reading.
         format: PointFormat,
-        /// Line of the fault.
+        /// Invalid line.
         line: u64,
-        /// Problem, with what was expected.
+        /// What is wrong and what is expected.
         reason: String,
     },
-    /// Binary data is wrong.
+    /// Invalid binary data.
     #[error("{format} file, at byte {byte}: {reason}")]
     Data {
-        /// Kind that the file was read as.
+        /// Format used for reading.
         format: PointFormat,
-        /// Place of the problem.
+        /// Position in the file.
         byte: u64,
-        /// Problem, with what was expected.
+        /// What is wrong and what is expected.
         reason: String,
     },
-    /// The end comes too early.
+    /// Truncated file.
     #[error("the file is cut short: it ends at byte {byte}, in {part}")]
     Truncated {
         /// Length of the file.
@@ -54,24 +54,24 @@ pub enum PointFileError {
         /// Part that was being read.
         part: String,
     },
-    /// Packed, where this build cannot unpack.
+    /// Compressed, in a build without decompression.
     #[cfg(not(feature = "bzip2"))]
     #[error("the file is packed with bzip2, which this build lacks: unpack it first")]
     Packed,
-    /// A kind that is known but not read.
+    /// Known but unsupported format.
     #[error("{what} is not read: {remedy}")]
     NotRead {
-        /// Kind of the file, and why if it depends.
+        /// Format, with the reason if it depends.
         what: &'static str,
-        /// Way to a file that is read.
+        /// Conversion to a supported format.
         remedy: &'static str,
     },
-    /// More points than the caller allows.
+    /// Point count above the caller's limit.
     #[error(
         "the file has {points} points or more, but at most {max_points} are allowed: raise the limit or thin the file"
     )]
     TooManyPoints {
-        /// Points promised by a header, or found so far.
+        /// Points stated by a header, or read so far.
         points: u64,
         /// Limit of the caller.
         max_points: usize,
@@ -80,7 +80,7 @@ pub enum PointFileError {
 
 #[cfg(feature = "survey")]
 impl PointFileError {
-    /// LAZ or E57, which are read in no order, inside of bzip2.
+    /// LAZ or E57 inside bzip2: both need random access.
     pub(super) const PACKED_TWICE: PointFileError = PointFileError::NotRead {
         what: "LAZ or E57 packed with bzip2",
         remedy: "unpack it with `bunzip2`",

@@ -1,11 +1,11 @@
-//! Kinds of point files, by name and by content.
+//! Point file formats, by extension and content.
 
 use std::fmt;
 use std::path::Path;
 
 use super::{PointFileError, las, octree};
 
-/// The kinds of point file that are read.
+/// Supported point file formats.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum PointFormat {
     /// PLY with text data.
@@ -53,7 +53,7 @@ impl fmt::Display for PointFormat {
     }
 }
 
-/// Formats that share a reader.
+/// Formats with a common reader.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Family {
     Ply,
@@ -65,7 +65,7 @@ pub(super) enum Family {
     Octree,
 }
 
-/// Families by the extension.
+/// Families by extension.
 const EXTENSIONS: [(&str, Family); 11] = [
     ("ply", Family::Ply),
     ("pcd", Family::Pcd),
@@ -80,7 +80,7 @@ const EXTENSIONS: [(&str, Family); 11] = [
     ("bt", Family::Octree),
 ];
 
-/// True for the name of a point file, packed or not.
+/// True for the extension of a point file, compressed or not.
 pub fn is_named_as_points(path: &Path) -> bool {
     let packed = path
         .extension()
@@ -98,13 +98,13 @@ fn by_name(path: &Path) -> Option<Family> {
     found.map(|(_, family)| *family)
 }
 
-/// True if the bytes are the start of a bzip2 stream with a block in it.
+/// True for the start of a bzip2 stream with a block.
 pub(super) fn is_bzip2(start: &[u8]) -> bool {
     let block = start.get(4..10) == Some(&[0x31, 0x41, 0x59, 0x26, 0x53, 0x59]);
     start.starts_with(b"BZh") && block
 }
 
-/// Length of what can only be the start of a bzip2 stream that ends before its first block.
+/// Length of a bzip2 stream that is truncated before its first block.
 pub(super) fn cut_bzip2(start: &[u8]) -> Option<u64> {
     const HEAD: [u8; 10] = *b"BZh91AY&SY";
     let is_start = match start {
@@ -114,7 +114,7 @@ pub(super) fn cut_bzip2(start: &[u8]) -> Option<u64> {
     is_start.then_some(start.len() as u64)
 }
 
-/// The family by the first bytes of the content, or else by the extension.
+/// Detects the family by the first bytes, else by the extension.
 pub(super) fn detect(start: &[u8], name: &Path) -> Result<Family, PointFileError> {
     if start.starts_with(b"ply\n") || start.starts_with(b"ply\r") {
         return Ok(Family::Ply);

@@ -1,5 +1,5 @@
-//! KITTI Velodyne scans: records of x, y, z and intensity as little-endian f32, and nothing else, or of other columns
-//! that the caller states; the labels of SemanticKITTI, a u32 for each point, are in a file beside.
+//! KITTI Velodyne scans: records of x, y, z and intensity as little-endian f32 without a header, or other columns
+//! stated by the caller; the labels of SemanticKITTI, a u32 per point, are in a separate file.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -12,7 +12,7 @@ use super::collect::Collector;
 use super::source::Source;
 use super::{PointFileError, PointFormat};
 
-/// The file with the labels of a scan: beside it, or in `labels` beside its folder, as SemanticKITTI has it.
+/// Label file of a scan: beside it, or in the folder `labels` beside its folder, as in SemanticKITTI.
 fn labels_of(scan: &Path) -> Option<PathBuf> {
     let beside = scan.with_extension("label");
     let folder = scan.parent()?.parent().map(|above| above.join("labels"));
@@ -38,7 +38,7 @@ impl Labels {
         Ok(Some(Labels { path, source }))
     }
 
-    /// The class of the next point: the low 16 bits, the others number the instance; 0 is none.
+    /// Class of the next point: the low 16 bits, the others are the instance; 0 is unlabelled.
     fn next(&mut self, number: u64) -> Result<u16, PointFileError> {
         let mut label = [0; 4];
         let path = self.path.display();
@@ -67,9 +67,9 @@ impl Labels {
     }
 }
 
-/// Reads a scan, with its labels if it has a name by which they are found.
+/// Reads a scan, with its labels if their file is found by its name.
 ///
-/// Without a layout it is one of KITTI, and refused if it cannot be; `size_bytes` is its length where that is known.
+/// Without a layout it must be a KITTI scan; `size_bytes` is its length if known.
 pub(super) fn read(
     source: &mut Source,
     (name, size_bytes): (&Path, Option<u64>),

@@ -1,10 +1,10 @@
-//! Names that programs give to the class of a point.
+//! Field names of point classes in common programs.
 
-/// Names in the order in which they are looked for, in any case; CloudCompare puts `scalar_` before them.
+/// Names in order of precedence, in any case; CloudCompare prefixes them with `scalar_`.
 const NAMES: [&str; 4] = ["label", "labels", "class", "classification"];
 const PREFIX: &str = "scalar_";
 
-/// Place of the class among the names of a file's fields.
+/// Index of the class among field names.
 pub(super) fn label_among<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<usize> {
     let bare = |name: &'a str| match name.split_at_checked(PREFIX.len()) {
         Some((prefix, rest)) if prefix.eq_ignore_ascii_case(PREFIX) => rest,

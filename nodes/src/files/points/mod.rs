@@ -1,9 +1,9 @@
-//! Points from files: PLY, PCD, LAS, text, KITTI scans and OctoMap's binary trees, any of them packed with
+//! Point files: PLY, PCD, LAS, text, KITTI scans and OctoMap's binary trees, all optionally compressed with
 //! bzip2; LAZ and E57 with the feature `survey`.
 //!
-//! Files are read as a stream, so that memory is bounded by the points kept and not by what a
-//! header promises. Coordinates are taken as they stand, in metres: the viewpoint of a PCD file and
-//! the like are not applied but warned of. Only the scans of an E57 file are placed by their poses, as they are meant.
+//! Files are read as streams, so that memory is bounded by the points kept, not by a header.
+//! Coordinates are used unchanged, in metres: the viewpoint of a PCD file and similar
+//! properties are not applied but reported. Only the scans of an E57 file are transformed by their poses.
 
 mod bin_layout;
 mod collect;
@@ -32,20 +32,20 @@ pub use format::{PointFormat, is_named_as_points};
 use collect::Collector;
 use source::Source;
 
-/// Bytes read from the disk at once.
+/// Read buffer, bytes.
 const BUFFER: usize = 1 << 16;
 
-/// Options of reading a point file.
+/// Options for reading a point file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct PointFileOptions {
-    /// Most points that are taken.
+    /// Limit of points.
     pub max_points: usize,
-    /// Columns of a `.bin` file; those of KITTI, which are checked, where nothing.
+    /// Columns of a `.bin` file; `None`: those of KITTI, with a check.
     pub columns: Option<BinLayout>,
 }
 
 impl Default for PointFileOptions {
-    /// A hundred million points, 2.4 GB.
+    /// A limit of a hundred million points, 2.4 GB.
     fn default() -> PointFileOptions {
         PointFileOptions {
             max_points: 100_000_000,
@@ -54,34 +54,34 @@ impl Default for PointFileOptions {
     }
 }
 
-/// The points of a file.
+/// Contents of a point file.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PointFile {
     /// Finite points in the order of the file, metres, in the frame of the file.
     pub points_m: Vec<[f64; 3]>,
-    /// Class of each point, [`UNLABELED`](lattice_core::registration::UNLABELED) where it has none;
+    /// Class of each point, [`UNLABELED`](lattice_core::registration::UNLABELED) if none;
     /// empty if the file has no `label`.
     pub labels: Vec<u16>,
-    /// Kind of the file.
+    /// Format of the file.
     pub format: PointFormat,
-    /// Points left out because a coordinate was NaN or infinite.
+    /// Skipped points with a NaN or infinite coordinate.
     pub skipped_not_finite: usize,
-    /// Points left out because they were 0 0 0: rays without return.
+    /// Removed points at 0 0 0: rays without return.
     pub no_returns: usize,
-    /// Edge of the voxels whose centres the points are, metres, if the file is an octree.
+    /// Voxel edge of an octree, whose points are voxel centres, metres.
     pub voxel_m: Option<f64>,
 }
 
 /// Reads the points of a file.
 ///
-/// The content decides on the format where it has a signature, otherwise the extension does.
-/// Errors do not name the file. What is left out or not applied of a file that is read is warned of.
+/// The format is detected by its signature, otherwise by the extension.
+/// Errors do not name the file. Skipped points and ignored properties are logged as warnings.
 pub fn read_points(path: &Path, options: &PointFileOptions) -> Result<PointFile, PointFileError> {
     let (reader, name, is_packed) = unpack(path)?;
     let mut source = Source::new(reader);
     let mut points = Collector::new(options.max_points);
     let mut voxel_m = None;
-    // LAZ and E57 are not read from the start to the end.
+    // LAZ and E57 need random access.
     let file = (!is_packed).then_some(path);
     let format = match format::detect(source.peek()?, &name)? {
         format::Family::Ply => ply::read(&mut source, &mut points)?,
@@ -114,7 +114,7 @@ pub fn read_points(path: &Path, options: &PointFileOptions) -> Result<PointFile,
     })
 }
 
-/// Reason for which a file has no points, of those that were left out.
+/// Reason why a file has no points, from the numbers of skipped ones.
 pub fn why_empty(not_finite: usize, no_returns: usize) -> String {
     match (not_finite, no_returns) {
         (0, 0) => "the file has no points".to_owned(),
@@ -137,12 +137,12 @@ fn read_e57(_file: Option<&Path>, _points: &mut Collector) -> Result<PointFormat
     })
 }
 
-/// Content and name of a file, both after unpacking.
+/// Content and name of a file, both after decompression.
 pub fn open(path: &Path) -> Result<(Box<dyn BufRead>, PathBuf), PointFileError> {
     unpack(path).map(|(reader, name, _)| (reader, name))
 }
 
-/// The same, with true if the file is packed.
+/// Content and name of a file, with true if it is compressed.
 fn unpack(path: &Path) -> Result<(Box<dyn BufRead>, PathBuf, bool), PointFileError> {
     let io = |source| PointFileError::Io { byte: 0, source };
     let mut packed = BufReader::with_capacity(BUFFER, File::open(path).map_err(io)?);

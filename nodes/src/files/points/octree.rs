@@ -1,8 +1,8 @@
-//! OctoMap's binary trees (`.bt`): the centres of the occupied voxels.
+//! OctoMap's binary trees (`.bt`): centres of the occupied voxels.
 //!
-//! A header of text, then two bytes for each inner node, depth first: two bits for each of its eight
-//! children, which say that it is unknown, free, occupied or an inner node. The tree has 16 levels and its
-//! middle at the origin; child i lies on the upper side of x, y or z by bit 0, 1 or 2 of i.
+//! A text header, then two bytes per inner node, depth first: two bits for each of its eight
+//! children (unknown, free, occupied or inner node). The tree has 16 levels and is
+//! centred at the origin; bits 0, 1 and 2 of a child's index select the upper half in x, y and z.
 
 use super::collect::Collector;
 use super::source::Source;
@@ -13,12 +13,12 @@ pub(super) const SIGNATURE: &[u8] = b"# Octomap OcTree binary file";
 /// First line of a tree with probabilities.
 pub(super) const FULL_SIGNATURE: &[u8] = b"# Octomap OcTree file";
 
-/// Levels of a tree below its root.
+/// Levels below the root.
 const LEVELS: u32 = 16;
-/// Most lines of a header.
+/// Limit of header lines.
 const MAX_LINES: u64 = 1000;
 
-/// Resolution and number of nodes, as the header states them.
+/// Resolution and number of nodes from the header.
 struct Header {
     resolution_m: f64,
     nodes: u64,
@@ -26,19 +26,19 @@ struct Header {
 
 /// An inner node whose children are read next.
 struct Inner {
-    /// Its lowest voxel on each axis, from the lowest of the tree.
+    /// Lowest voxel on each axis, relative to the lowest of the tree.
     corner: [u32; 3],
     /// Levels below it.
     levels: u32,
 }
 
-/// Reads the voxels; gives their edge, metres, too.
+/// Reads the voxels; also returns their edge, metres.
 pub(super) fn read(
     source: &mut Source,
     points: &mut Collector,
 ) -> Result<(PointFormat, f64), PointFileError> {
     let header = read_header(source)?;
-    // Nodes that were read; the root is one.
+    // Number of nodes read; the root is one.
     let mut nodes = u64::from(header.nodes > 0);
     let mut inner = Vec::new();
     if header.nodes > 0 {
@@ -58,7 +58,7 @@ pub(super) fn read(
             reason: reason.to_owned(),
         };
         let levels = node.levels.saturating_sub(1);
-        // From the last to the first, since the last to be pushed is read next.
+        // In reverse order: the last pushed node is read first.
         for child in (0..8_u32).rev() {
             let corner = [0, 1, 2].map(|axis| {
                 let low = node.corner.get(axis).copied().unwrap_or_default();
@@ -87,7 +87,7 @@ pub(super) fn read(
     Ok((PointFormat::OctoMapBinary, header.resolution_m))
 }
 
-/// Takes all voxels of an occupied node.
+/// Adds all voxels of an occupied node.
 fn push_voxels(
     points: &mut Collector,
     corner: [u32; 3],
@@ -95,13 +95,13 @@ fn push_voxels(
     resolution_m: f64,
 ) -> Result<(), PointFileError> {
     let side = 1_u32 << levels;
-    // Refused before any is made.
+    // Checked before any is created.
     points.promise_more(u64::from(side).pow(3))?;
     let range = |axis: usize| {
         let low = corner.get(axis).copied().unwrap_or_default();
         low..low + side
     };
-    // The middle of the tree is between two voxels.
+    // The centre of the tree is between two voxels.
     let center_m = |voxel: u32| (f64::from(voxel) - 32767.5) * resolution_m;
     for z in range(2) {
         for y in range(1) {

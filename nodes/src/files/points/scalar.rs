@@ -1,6 +1,6 @@
-//! Numbers as bytes.
+//! Numbers in binary form.
 
-/// Types of number in point files.
+/// Number types of point files.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Scalar {
     I8,
@@ -28,7 +28,7 @@ impl Scalar {
         matches!(self, Scalar::F32 | Scalar::F64)
     }
 
-    /// The number at the start of little-endian `bytes`; `None` if there are too few.
+    /// Decodes the number at the start of little-endian `bytes`; `None` if there are too few.
     pub fn decode(self, bytes: &[u8]) -> Option<f64> {
         Some(match self {
             Scalar::I8 => i8::from_le_bytes(first(bytes)?).into(),

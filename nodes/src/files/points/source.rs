@@ -1,4 +1,4 @@
-//! A stream that knows where it is.
+//! Input stream with its position.
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -6,7 +6,7 @@ use std::io::{self, BufRead, Read};
 
 use super::PointFileError;
 
-/// Longest line that is read, bytes.
+/// Longest line, bytes.
 const MAX_LINE: u64 = 1 << 20;
 
 /// Bytes of a file in order, with the position for messages.
@@ -18,7 +18,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// A source at the beginning of its file.
+    /// Source at the beginning of its file.
     pub fn new(reader: Box<dyn BufRead>) -> Source {
         Source {
             reader,
@@ -33,7 +33,7 @@ impl Source {
         self.byte
     }
 
-    /// Number of the line read last, from 1.
+    /// Number of the last line read, from 1.
     pub fn line_number(&self) -> u64 {
         self.line
     }
@@ -42,7 +42,7 @@ impl Source {
         failed(self.byte, source)
     }
 
-    /// Some of the bytes to come; none at the end of the file only.
+    /// Some of the next bytes; empty at the end of the file only.
     pub fn peek(&mut self) -> Result<&[u8], PointFileError> {
         let byte = self.byte;
         self.reader
@@ -50,7 +50,7 @@ impl Source {
             .map_err(|source| failed(byte, source))
     }
 
-    /// The next line without its end, `None` at the end of the file.
+    /// Next line without its end, `None` at the end of the file.
     pub fn line(&mut self) -> Result<Option<Cow<'_, str>>, PointFileError> {
         self.buffer.clear();
         let mut limited = (&mut self.reader).take(MAX_LINE);
@@ -70,13 +70,13 @@ impl Source {
         Ok(Some(String::from_utf8_lossy(&self.buffer)))
     }
 
-    /// The next line, which must be there for `part` to be whole.
+    /// Next line; an error at the end of the file names `part`.
     pub fn expect_line(&mut self, part: impl Display) -> Result<Cow<'_, str>, PointFileError> {
         let byte = self.byte;
         self.line()?.ok_or_else(|| truncated(byte, part))
     }
 
-    /// Fills `bytes`, which are needed for `part`.
+    /// Fills `bytes`; an error at the end of the file names `part`.
     pub fn exact(&mut self, bytes: &mut [u8], part: impl Display) -> Result<(), PointFileError> {
         let mut rest = bytes;
         while !rest.is_empty() {
@@ -93,7 +93,7 @@ impl Source {
         Ok(())
     }
 
-    /// The next `length` bytes, which are needed for `part`; takes no more memory than there is data.
+    /// Next `length` bytes; an error names `part`. Memory is bounded by the available data.
     pub fn take(&mut self, length: u64, part: impl Display) -> Result<Vec<u8>, PointFileError> {
         let mut bytes = Vec::new();
         let read = (&mut self.reader).take(length).read_to_end(&mut bytes);
@@ -101,7 +101,7 @@ impl Source {
         Ok(bytes)
     }
 
-    /// Passes over `length` bytes of `part`.
+    /// Skips `length` bytes of `part`.
     pub fn skip(&mut self, length: u64, part: impl Display) -> Result<(), PointFileError> {
         let read = io::copy(&mut (&mut self.reader).take(length), &mut io::sink());
         self.advance(read, length, part)
@@ -122,7 +122,7 @@ impl Source {
     }
 }
 
-/// Only a decoder misses bytes that it expects.
+/// Read error; an unexpected end occurs in decoders only.
 fn failed(byte: u64, source: io::Error) -> PointFileError {
     match source.kind() {
         io::ErrorKind::UnexpectedEof => truncated(byte, "its packed data"),

@@ -1,8 +1,8 @@
-//! Text files: one point a line, columns between blanks, commas or semicolons.
+//! Text files: one point per line, columns separated by blanks, commas or semicolons.
 //!
-//! x, y and z are the first three columns, unless the first line names its columns; a column that it
-//! names `label` is the class. Further columns are ignored, and so are empty lines and what follows `#`, `%` or `//`.
-//! Decimal commas are read where they cannot be separators: between semicolons, blanks or quotes.
+//! x, y and z are the first three columns, unless the first line names its columns; a column
+//! named `label` is the class. Further columns, empty lines and comments after `#`, `%` or `//` are ignored.
+//! Decimal commas are accepted where they cannot be separators: between semicolons, blanks or quotes.
 
 use super::collect::Collector;
 use super::label::label_among;
@@ -54,13 +54,13 @@ pub(super) fn read(
     Ok(PointFormat::Text)
 }
 
-/// The line without comment and surrounding blanks.
+/// Line without comment and surrounding blanks.
 fn content(line: &str) -> &str {
     let line = line.split(['#', '%']).next().unwrap_or_default();
     line.split("//").next().unwrap_or_default().trim()
 }
 
-/// Separator between the columns of a line.
+/// Column separator of a line.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Separator {
     Blank,
@@ -84,7 +84,7 @@ impl<'a> Row<'a> {
         Self { content, separator }
     }
 
-    /// The columns of the line, without quotes.
+    /// Columns of the line, without quotes.
     fn fields(&self) -> impl Iterator<Item = &'a str> + Clone + use<'a> {
         let separator = self.separator;
         let mut quoted = false;
@@ -101,7 +101,7 @@ impl<'a> Row<'a> {
         fields.filter(move |field| separator != Separator::Blank || !field.is_empty())
     }
 
-    /// Places of the columns x, y and z, if the line names them.
+    /// Indices of the columns x, y and z, if the line names them.
     fn names(&self) -> Option<[usize; 3]> {
         let column = |name| {
             self.fields()
@@ -136,7 +136,7 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// A column behind a comma that only decimals would begin with a zero, in a line without decimal points.
+    /// Column after a comma with a leading zero, which only decimals have, in a line without decimal points.
     fn fraction(&self) -> Option<&'a str> {
         if self.separator != Separator::Comma || self.content.contains(['.', '"']) {
             return None;
@@ -148,7 +148,7 @@ impl<'a> Row<'a> {
     }
 }
 
-/// True for columns between blanks of which the first three are numbers, one of them with a decimal comma.
+/// True for blank-separated columns whose first three are numbers, one of them with a decimal comma.
 fn has_decimal_commas(content: &str) -> bool {
     let mut words = content
         .split_whitespace()
@@ -159,7 +159,7 @@ fn has_decimal_commas(content: &str) -> bool {
         && axes.iter().flatten().any(|word| word.contains(','))
 }
 
-/// A number in any usual spelling, also with a decimal comma between digits.
+/// Parses a number in any usual notation, also with a decimal comma between digits.
 fn decimal(word: &str) -> Option<f64> {
     let Some((whole, fraction)) = word.split_once(',') else {
         return number(word);
@@ -175,7 +175,7 @@ fn decimal(word: &str) -> Option<f64> {
         .flatten()
 }
 
-/// A number in any usual spelling, NaN and infinities too.
+/// Parses a number in any usual notation, NaN and infinities too.
 pub(super) fn number(word: &str) -> Option<f64> {
     word.parse().ok()
 }

@@ -1,9 +1,9 @@
-//! Vertices and corners in the bytes of a buffer.
+//! Vertices and indices from buffers.
 
 use super::buffers::Buffers;
 use super::document::Document;
 
-/// The way in which numbers are written.
+/// Number encoding of an accessor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Form {
     component_type: u32,
@@ -11,7 +11,7 @@ struct Form {
 }
 
 impl Form {
-    /// Bytes of a number; `None` for a type that there is not.
+    /// Bytes per number; `None` for an unknown type.
     fn bytes(self) -> Option<usize> {
         match self.component_type {
             5120 | 5121 => Some(1),
@@ -21,7 +21,7 @@ impl Form {
         }
     }
 
-    /// The number in these bytes, which are as many as [`Form::bytes`] says.
+    /// Decodes a number of [`Form::bytes`] bytes.
     fn number(self, bytes: &[u8]) -> f64 {
         let (value, most) = match (self.component_type, bytes) {
             (5120, &[a]) => (f64::from(a as i8), f64::from(i8::MAX)),
@@ -38,7 +38,7 @@ impl Form {
     }
 }
 
-/// Records of an accessor: its view from the first one on, and their distance.
+/// Records of an accessor: bytes from the first one on, and their stride.
 struct Records<'a> {
     bytes: &'a [u8],
     stride: usize,
@@ -54,18 +54,18 @@ impl<'a> Records<'a> {
     }
 }
 
-/// Number of records that an accessor says it has.
+/// Number of records stated by an accessor.
 pub(super) fn count(document: &Document, number: usize) -> Result<u64, String> {
     let accessor = document.accessors.0.get(number);
     let accessor = accessor.ok_or_else(|| format!("there is no accessor {number}"))?;
     match accessor.count {
-        // Else what costs nothing could stand there without end.
+        // Without this, documents could list free accessors without end.
         0 => Err(format!("accessor {number}: it has no records")),
         count => Ok(count),
     }
 }
 
-/// The vertices of an accessor of positions. `quantized` allows integers (`KHR_mesh_quantization`).
+/// Vertices of a position accessor. `quantized` allows integers (`KHR_mesh_quantization`).
 pub(super) fn positions(
     document: &Document,
     buffers: &mut Buffers<'_>,
@@ -85,7 +85,7 @@ pub(super) fn positions(
     Ok(records.iter().map(vertex).collect())
 }
 
-/// The vertices of the corners of an accessor of indices.
+/// Vertex indices of an index accessor.
 pub(super) fn corners(
     document: &Document,
     buffers: &mut Buffers<'_>,
@@ -107,7 +107,7 @@ pub(super) fn corners(
     Ok(records.iter().map(corner).collect())
 }
 
-/// The records of an accessor, all of them within its view.
+/// Records of an accessor, checked to be within its view.
 fn records<'b>(
     document: &Document,
     buffers: &'b mut Buffers<'_>,
@@ -134,7 +134,7 @@ fn records<'b>(
         return refuse(format!("component type {found}, not one of {allowed:?}"));
     };
     if accessor.sparse.is_some() {
-        return refuse("sparse accessors are not read".to_owned());
+        return refuse("sparse accessors are not supported".to_owned());
     }
     let Some(view_number) = accessor.buffer_view else {
         return refuse("it has no buffer view".to_owned());
@@ -143,7 +143,7 @@ fn records<'b>(
     let (view, stride) = buffers.view(view_number)?;
     let stride = stride.unwrap_or(size as u64);
     if stride < size as u64 || stride > 252.max(size as u64) {
-        return refuse(format!("byteStride {stride}, not from {size} to 252"));
+        return refuse(format!("byteStride {stride} is outside {size}..=252"));
     }
     let last = accessor.count.checked_sub(1);
     let end = last.and_then(|last| last.checked_mul(stride)?.checked_add(size as u64));

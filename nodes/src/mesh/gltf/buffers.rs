@@ -1,4 +1,4 @@
-//! The bytes of buffers: of the file, of data URIs, of files beside it.
+//! Buffers: in the file, in data URIs, or in separate files.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -10,10 +10,10 @@ use base64::engine::general_purpose::STANDARD;
 
 use super::document::{Buffer, BufferView, Document};
 
-/// Most bytes of all buffers that are read from elsewhere.
+/// Limit of bytes of all external buffers.
 const MAX_BYTES: u64 = 1 << 30;
 
-/// Buffers, each read when it is first used.
+/// Buffers, each read at its first use.
 pub(super) struct Buffers<'a> {
     document: &'a Document,
     binary: Option<&'a [u8]>,
@@ -23,7 +23,7 @@ pub(super) struct Buffers<'a> {
 }
 
 impl<'a> Buffers<'a> {
-    /// Buffers of a document with the bytes that came with it; files are looked for in the folder alone.
+    /// Buffers of a document with its binary chunk; files are read from the folder only.
     pub fn new(
         document: &'a Document,
         binary: Option<&'a [u8]>,
@@ -39,7 +39,7 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    /// The bytes of a view, and the distance of its records if it names one.
+    /// Bytes of a view, and its stride if given.
     pub fn view(&mut self, number: usize) -> Result<(&[u8], Option<u64>), String> {
         let views = &self.document.buffer_views.0;
         let &BufferView {
@@ -80,7 +80,7 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// The bytes of a buffer, of exactly the length that it says.
+/// Bytes of a buffer, with exactly the stated length.
 fn content<'a>(
     buffer: &Buffer,
     number: usize,
@@ -90,9 +90,7 @@ fn content<'a>(
 ) -> Result<Cow<'a, [u8]>, String> {
     let length = buffer.byte_length;
     if before.saturating_add(length) > MAX_BYTES {
-        return Err(format!(
-            "{length} bytes, but at most {MAX_BYTES} of all buffers are taken"
-        ));
+        return Err(format!("{length} bytes, so all buffers exceed {MAX_BYTES}"));
     }
     let mut bytes: Cow<'a, [u8]> = match buffer.uri.as_deref() {
         None if number == 0 => binary.ok_or("it has no uri, and the file no bytes")?.into(),
@@ -105,7 +103,9 @@ fn content<'a>(
     let wanted = usize::try_from(length).ok();
     let found = bytes.len();
     let Some(wanted) = wanted.filter(|wanted| *wanted <= found) else {
-        return Err(format!("{length} bytes are said, but {found} are there"));
+        return Err(format!(
+            "{length} bytes are stated, but {found} are present"
+        ));
     };
     match &mut bytes {
         Cow::Borrowed(bytes) => *bytes = bytes.get(..wanted).unwrap_or_default(),
@@ -114,7 +114,7 @@ fn content<'a>(
     Ok(bytes)
 }
 
-/// The bytes of a data URI behind `data:`.
+/// Bytes of a data URI after `data:`.
 fn embedded(data: &str) -> Result<Vec<u8>, String> {
     let (media, text) = data.split_once(',').ok_or("its data URI has no comma")?;
     if !media.ends_with(";base64") {
@@ -124,15 +124,15 @@ fn embedded(data: &str) -> Result<Vec<u8>, String> {
     decoded.map_err(|error| format!("its data URI is not base64: {error}"))
 }
 
-/// The first bytes of a file in the folder or below it.
+/// First bytes of a file in the folder or below it.
 fn beside(uri: &str, folder: Option<&Path>, length: u64) -> Result<Vec<u8>, String> {
-    let folder = folder.ok_or("files beside this one are not read")?;
+    let folder = folder.ok_or("separate buffer files are not supported here")?;
     let path = inside(uri).ok_or_else(|| {
         let uri: String = uri.chars().take(80).collect();
         format!("'{uri}' leads out of the folder of the file")
     })?;
     let failed = |error: std::io::Error| format!("{}: {error}", path.display());
-    // A link may lead elsewhere, too.
+    // A link may lead outside, too.
     let folder = folder.canonicalize().map_err(failed)?;
     let full = folder.join(&path).canonicalize().map_err(failed)?;
     if !full.starts_with(&folder) {
@@ -142,7 +142,7 @@ fn beside(uri: &str, folder: Option<&Path>, length: u64) -> Result<Vec<u8>, Stri
         ));
     }
     if !full.metadata().map_err(failed)?.is_file() {
-        return Err(format!("{} is no file", path.display()));
+        return Err(format!("{} is not a file", path.display()));
     }
     let mut bytes = Vec::new();
     let file = File::open(&full).map_err(failed)?;
@@ -150,7 +150,7 @@ fn beside(uri: &str, folder: Option<&Path>, length: u64) -> Result<Vec<u8>, Stri
     Ok(bytes)
 }
 
-/// A relative path that goes down alone; percent codes are read.
+/// Relative path without `..`; percent codes are decoded.
 fn inside(uri: &str) -> Option<PathBuf> {
     let mut bytes = Vec::new();
     let mut rest = uri.as_bytes();
@@ -162,7 +162,7 @@ fn inside(uri: &str) -> Option<PathBuf> {
         }
         let (code, after) = rest.split_at_checked(2)?;
         let code = std::str::from_utf8(code).ok()?;
-        // A sign would be read as part of the number.
+        // A sign would be parsed as part of the number.
         let code = Some(code).filter(|code| code.bytes().all(|b| b.is_ascii_hexdigit()))?;
         bytes.push(u8::from_str_radix(code, 16).ok()?);
         rest = after;

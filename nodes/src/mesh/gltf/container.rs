@@ -1,18 +1,18 @@
-//! The two forms of a file: text (`.gltf`), or text and bytes in chunks (`.glb`).
+//! The two file forms: text (`.gltf`), or text and binary data in chunks (`.glb`).
 
 /// First bytes of a binary file.
 const MAGIC: &[u8] = b"glTF";
-/// Most bytes of the text.
+/// Limit of the JSON text, bytes.
 const MAX_TEXT_BYTES: usize = 256 << 20;
 
-/// The text of a file, and the bytes that came with it.
+/// JSON text of a file, and its binary chunk.
 #[derive(Debug, PartialEq)]
 pub(super) struct Container<'a> {
     pub text: &'a [u8],
     pub binary: Option<&'a [u8]>,
 }
 
-/// Parts a file.
+/// Splits a file into its parts.
 pub(super) fn open(bytes: &[u8]) -> Result<Container<'_>, String> {
     let container = match bytes.starts_with(MAGIC) {
         true => chunks(bytes)?,
@@ -23,7 +23,7 @@ pub(super) fn open(bytes: &[u8]) -> Result<Container<'_>, String> {
     };
     match container.text.len() {
         found if found > MAX_TEXT_BYTES => Err(format!(
-            "{found} bytes of JSON, but at most {MAX_TEXT_BYTES} are taken: write it as .glb"
+            "{found} bytes of JSON, more than {MAX_TEXT_BYTES}: write it as .glb"
         )),
         _ => Ok(container),
     }
@@ -49,7 +49,7 @@ fn chunks(bytes: &[u8]) -> Result<Container<'_>, String> {
         match kind {
             b"JSON" if text.is_none() => text = Some(chunk),
             b"BIN\0" if binary.is_none() => binary = Some(chunk),
-            // Chunks of other kinds are to be passed over.
+            // Chunks of other types are skipped, as specified.
             _ => {}
         }
         rest = Some(after);

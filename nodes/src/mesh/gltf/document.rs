@@ -1,4 +1,4 @@
-//! The parts of a glTF 2.0 document that make a mesh.
+//! The parts of a glTF 2.0 document that define a mesh.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -6,10 +6,10 @@ use std::marker::PhantomData;
 use serde::de::{Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, de};
 
-/// Most nodes, meshes, accessors and so on of a document: a few bytes of text make one of them.
+/// Limit of nodes, meshes, accessors and so on in a document: each needs only a few bytes of text.
 const MAX_OBJECTS: usize = 100_000;
 
-/// A document. What is not named here does not change where triangles are.
+/// A document. Other properties do not affect triangle positions.
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Document {
@@ -24,28 +24,28 @@ pub(super) struct Document {
     pub buffers: Few<Buffer>,
 }
 
-/// Word about the document itself.
+/// Metadata of the document.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Asset {
     pub version: String,
 }
 
-/// Nodes that are shown together.
+/// Nodes of one scene.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Scene {
     pub nodes: Few<usize>,
 }
 
-/// A place, and what is there.
+/// Node: a transform with a mesh or child nodes.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Node {
     pub children: Few<usize>,
     pub mesh: Option<usize>,
     pub skin: Option<usize>,
-    /// Column by column.
+    /// Column-major matrix.
     pub matrix: Option<Box<[f64; 16]>>,
     pub translation: Option<[f64; 3]>,
     /// x, y, z, w.
@@ -54,7 +54,7 @@ pub(super) struct Node {
     pub extras: Extras,
 }
 
-/// Primitives that go together.
+/// Mesh: a list of primitives.
 #[derive(Debug, Deserialize)]
 pub(super) struct Mesh {
     pub primitives: Few<Primitive>,
@@ -62,7 +62,7 @@ pub(super) struct Mesh {
     pub extras: Extras,
 }
 
-/// Triangles, or what else is drawn.
+/// Primitive: triangles or another mode.
 #[derive(Debug, Deserialize)]
 pub(super) struct Primitive {
     pub attributes: Attributes,
@@ -72,14 +72,14 @@ pub(super) struct Primitive {
     pub extras: Extras,
 }
 
-/// Accessors of the vertices.
+/// Vertex attributes, as accessors.
 #[derive(Debug, Deserialize)]
 pub(super) struct Attributes {
     #[serde(rename = "POSITION")]
     pub position: Option<usize>,
 }
 
-/// Numbers in a view.
+/// Typed view of numbers.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Accessor {
@@ -95,7 +95,7 @@ pub(super) struct Accessor {
     pub sparse: Option<IgnoredAny>,
 }
 
-/// A part of a buffer.
+/// Part of a buffer.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct BufferView {
@@ -106,7 +106,7 @@ pub(super) struct BufferView {
     pub byte_stride: Option<u64>,
 }
 
-/// Bytes: of the file itself without `uri`.
+/// Buffer: the binary chunk of the file if `uri` is missing.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Buffer {
@@ -114,7 +114,7 @@ pub(super) struct Buffer {
     pub byte_length: u64,
 }
 
-/// A list that is not longer than anybody needs.
+/// A list of bounded length.
 #[derive(Debug)]
 pub(super) struct Few<T>(pub Vec<T>);
 
@@ -151,7 +151,7 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for FewVisitor<T> {
     }
 }
 
-/// Word of the application: of a node, a mesh or a primitive.
+/// Application data of a node, a mesh or a primitive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Extras {
     pub label: Option<f64>,
@@ -165,7 +165,7 @@ impl<'de> Deserialize<'de> for Extras {
     }
 }
 
-/// A value of an application, of which nothing else is kept, whatever it is.
+/// An application value, kept only if it is a number.
 #[derive(Default)]
 struct Given {
     number: Option<f64>,

@@ -1,4 +1,4 @@
-//! Meshes from glTF 2.0 files: the triangles of one scene, at the places of their nodes.
+//! Meshes from glTF 2.0 files: the triangles of one scene, transformed by their nodes.
 
 mod accessor;
 mod buffers;
@@ -21,9 +21,9 @@ use self::document::{Document, Extras, Node, Primitive};
 use super::labelled::Parts;
 use super::{LabelledMesh, MeshError};
 
-/// Most bytes of a file.
+/// Limit of file size, bytes.
 const MAX_BYTES: u64 = 1 << 30;
-/// Modes of primitives in their order; triangles alone are taken.
+/// Primitive modes in the order of their codes; only triangles are supported.
 const MODES: [&str; 7] = [
     "POINTS",
     "LINES",
@@ -34,9 +34,9 @@ const MODES: [&str; 7] = [
     "TRIANGLE_FAN",
 ];
 const TRIANGLES: u32 = 4;
-/// Extension by which vertices may be integers.
+/// Extension for integer vertices.
 const QUANTIZATION: &str = "KHR_mesh_quantization";
-/// Beginnings of extensions that a file may ask for, as they do not change where triangles are.
+/// Prefixes of supported required extensions, which do not affect triangle positions.
 const HARMLESS: [&str; 4] = [
     "KHR_materials_",
     "KHR_texture_",
@@ -44,7 +44,7 @@ const HARMLESS: [&str; 4] = [
     "KHR_lights_",
 ];
 
-/// Reads a file. Its axes (y up, right-handed) become these: see [`in_axes`].
+/// Reads a file. Its axes (y up, right-handed) are converted by [`in_axes`].
 pub(super) fn read(
     reader: impl BufRead,
     folder: Option<&Path>,
@@ -61,10 +61,10 @@ pub(super) fn read(
     from_bytes(&bytes, folder, axes, max_triangles)
 }
 
-/// Reads the bytes of a file. Buffers that are files are looked for in the folder, if there is one.
+/// Reads the bytes of a file. External buffers are read from the folder, if given.
 ///
-/// A class and an instance of all triangles of a node, a mesh or a primitive may stand in its `extras` as
-/// `label` and `instance`; the innermost holds. Without, triangles are unlabelled and each node with a mesh
+/// Class and instance of all triangles of a node, a mesh or a primitive are given in its `extras` as
+/// `label` and `instance`; the innermost applies. By default triangles are unlabelled and each node with a mesh
 /// is an instance.
 pub fn from_bytes(
     bytes: &[u8],
@@ -108,16 +108,16 @@ fn check(document: &Document) -> Result<bool, String> {
     if let Some(name) = required.iter().find(|name| !harmless(name)) {
         let name: String = name.chars().take(80).collect();
         return Err(format!(
-            "it needs the extension {name}, which is not read: write it without"
+            "the required extension {name} is not supported: export without it"
         ));
     }
     Ok(required.iter().any(|name| name == QUANTIZATION))
 }
 
-/// A point of glTF (left, up, forward, by its specification) in these axes, metres.
+/// Converts a glTF point (left, up, forward, by its specification) to these axes, metres.
 ///
-/// Those of ROS are reached as by Blender and most converters, (x, -z, y): z up, and a scene that was
-/// written as PLY and as glTF is one. Unity's importers negate x; WinRT, OpenXR and ARKit take a file as it is.
+/// The axes of ROS are (x, -z, y), z up, as in Blender and most converters, so that a scene written
+/// as PLY and as glTF agrees. Unity's importers negate x; WinRT, OpenXR and ARKit use the file axes.
 fn in_axes(axes: Axes, p: Point3<f64>) -> [f32; 3] {
     let [x, y, z] = p.coords.into();
     let turned = match axes {
@@ -129,7 +129,7 @@ fn in_axes(axes: Axes, p: Point3<f64>) -> [f32; 3] {
     turned.map(|c| c as f32)
 }
 
-/// A document that is being read.
+/// State of reading a document.
 struct Reading<'a> {
     document: &'a Document,
     buffers: Buffers<'a>,
@@ -137,21 +137,21 @@ struct Reading<'a> {
     is_quantized: bool,
     max_triangles: usize,
     parts: Parts,
-    /// Nodes with a mesh so far.
+    /// Number of nodes with a mesh so far.
     nodes: usize,
 }
 
-/// A node with a mesh: its place, and what is said of its triangles.
+/// Node with a mesh: its transform, label and instance.
 struct Placed {
     scene_from_node: Matrix4<f64>,
     label: u16,
     instance: u16,
-    /// First vertex of each accessor of positions.
+    /// Index of the first vertex of each position accessor.
     first: BTreeMap<usize, u32>,
 }
 
 impl<'a> Reading<'a> {
-    /// Reads the nodes of the scene, each once: nodes are trees.
+    /// Reads the nodes of the scene, each once: nodes form trees.
     fn scene(&mut self) -> Result<(), MeshError> {
         let document = self.document;
         let mut seen = vec![false; document.nodes.0.len()];
@@ -159,7 +159,7 @@ impl<'a> Reading<'a> {
         let mut next = self.roots()?;
         let mut scene_from_parent = Matrix4::identity();
         loop {
-            // The first of them comes next.
+            // In reverse order: the first child is read next.
             for &number in next.iter().rev() {
                 let (Some(node), Some(seen)) = (document.nodes.0.get(number), seen.get_mut(number))
                 else {
@@ -178,7 +178,7 @@ impl<'a> Reading<'a> {
             if let Some(mesh) = node.mesh {
                 let of_node = |reason| fault(format!("node {number}, mesh {mesh}: {reason}"));
                 if node.skin.is_some() {
-                    return Err(of_node("skinned meshes are not read".to_owned()));
+                    return Err(of_node("skinned meshes are not supported".to_owned()));
                 }
                 self.mesh(node, mesh, scene_from_node)
                     .map_err(|error| match error {
@@ -195,7 +195,7 @@ impl<'a> Reading<'a> {
         }
     }
 
-    /// Nodes of the scene that is to be shown; without scenes all that are below none.
+    /// Root nodes of the default scene; without scenes all nodes without a parent.
     fn roots(&self) -> Result<Cow<'a, [usize]>, MeshError> {
         let Document {
             scene,
@@ -250,7 +250,7 @@ impl<'a> Reading<'a> {
         if mode != TRIANGLES {
             let name = MODES.get(mode as usize).copied().unwrap_or("unknown");
             return Err(fault(format!(
-                "primitives of mode {mode} ({name}) are not read, TRIANGLES alone"
+                "primitives of mode {mode} ({name}) are not supported, only TRIANGLES"
             )));
         }
         let position = primitive.attributes.position;
@@ -261,9 +261,9 @@ impl<'a> Reading<'a> {
             None => vertices,
         };
         if !corners.is_multiple_of(3) {
-            return Err(fault(format!("{corners} corners make no whole triangles")));
+            return Err(fault(format!("{corners} indices are not a multiple of 3")));
         }
-        // Before anything is made: a few bytes may name one accessor many times.
+        // Checked before allocation: a few bytes may refer to one accessor many times.
         let triangles = (corners / 3).saturating_add(self.parts.triangles.len() as u64);
         let max = self.max_triangles;
         if triangles > max as u64 {
@@ -283,7 +283,7 @@ impl<'a> Reading<'a> {
         added
     }
 
-    /// Adds the vertices of an accessor once for each node; gives the number of the first.
+    /// Adds the vertices of an accessor once per node; returns the index of the first.
     fn vertices(
         &mut self,
         position: usize,
@@ -319,14 +319,15 @@ impl<'a> Reading<'a> {
         vertices: u64,
         placed: &Placed,
     ) -> Result<(), MeshError> {
-        // By the specification a mirrored node turns its triangles round.
+        // By the specification a mirrored node reverses its triangles.
         let linear = placed.scene_from_node.fixed_view::<3, 3>(0, 0);
         let is_mirrored = linear.determinant() < 0.0;
         let turned = is_mirrored != (self.axes.matrix().determinant() < 0.0);
         let parts = &mut self.parts;
         for &[a, b, c] in corners.as_chunks().0 {
             if let Some(corner) = [a, b, c].iter().find(|v| u64::from(**v) >= vertices) {
-                let problem = format!("a triangle has vertex {corner}, but there are {vertices}");
+                let problem =
+                    format!("a triangle refers to vertex {corner}, outside 0..{vertices}");
                 return Err(fault(problem));
             }
             let triangle = if turned { [a, c, b] } else { [a, b, c] };
@@ -340,7 +341,7 @@ impl<'a> Reading<'a> {
 }
 
 impl Placed {
-    /// Takes what is said of a part, over what was said of the whole.
+    /// Applies the label and instance of a part, which override those of the whole.
     fn say(&mut self, extras: &Extras) -> Result<(), String> {
         for (what, given, known) in [
             ("label", extras.label, &mut self.label),
@@ -348,9 +349,7 @@ impl Placed {
         ] {
             let Some(number) = given else { continue };
             if number.fract() != 0.0 || !(0.0..=f64::from(u16::MAX)).contains(&number) {
-                return Err(format!(
-                    "{what} {number} is no whole number from 0 to 65535"
-                ));
+                return Err(format!("{what} {number} is not an integer in 0..=65535"));
             }
             *known = number as u16;
         }

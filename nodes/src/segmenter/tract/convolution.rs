@@ -1,4 +1,4 @@
-//! Convolutions of images: sums of shifted rows, band by band, where tract gathers every pixel of every tap.
+//! Image convolution as sums of shifted rows in bands, in place of tract's gathering of every pixel per tap.
 
 use std::cell::RefCell;
 use std::ops::Range;
@@ -13,7 +13,7 @@ use tract_onnx::tract_hir::tract_core::op_out_of_plan;
 use super::planes::Layout;
 use super::taps::{MAX_LANES, OUTPUTS, Sums};
 
-/// A convolution of one image (1 x channels x rows x columns) with weights and bias in the order of [`packed`].
+/// Convolution of one image (1 x channels x rows x columns), with weights and bias in the order of [`packed`].
 #[derive(Clone, Debug, Hash, PartialEq, Eq)]
 pub(super) struct Convolution {
     pub layout: Layout,
@@ -21,7 +21,7 @@ pub(super) struct Convolution {
     pub output: [usize; 4],
 }
 
-/// Values of each output (outputs x `taps`), [`OUTPUTS`] at a time, those of each tap side by side; zeros fill up.
+/// Packs weights (outputs x `taps`) in groups of [`OUTPUTS`], contiguous per tap, padded with zeros.
 pub(super) fn packed(values: &[f32], outputs: usize) -> Vec<f32> {
     let taps = values.len() / outputs.max(1);
     let mut packed = vec![0.0; outputs.next_multiple_of(OUTPUTS) * taps];
@@ -38,14 +38,14 @@ pub(super) fn packed(values: &[f32], outputs: usize) -> Vec<f32> {
     packed
 }
 
-/// Rows of the output, and the part of each channel that they are.
+/// Output rows of a band, and its part of each channel.
 struct Band<'a> {
     rows: Range<usize>,
     outputs: Vec<&'a mut [f32]>,
 }
 
 thread_local! {
-    /// Planes and sums of a band: memory of this size would be fetched anew from the system each time.
+    /// Planes and sums of a band, reused: buffers of this size would be allocated from the system each time.
     static SCRATCH: RefCell<[Vec<f32>; 2]> = const { RefCell::new([Vec::new(), Vec::new()]) };
 }
 

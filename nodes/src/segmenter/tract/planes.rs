@@ -1,49 +1,49 @@
-//! An image as planes in which the taps of a convolution are rows, shifted.
+//! Image planes in which convolution taps are shifted rows.
 
 use std::ops::Range;
 
 use super::taps::MAX_LANES;
 
-/// Most values of a band that stay near the processor (half of a cache of 1 MiB).
+/// Values of a band that fit half of a 1 MiB cache.
 const NEAR: usize = 1 << 17;
-/// Most values of a band at all; a thread holds as many.
+/// Limit of values of a band, per thread.
 const MAX_VALUES: usize = 1 << 22;
 
-/// A convolution along one axis of an image.
+/// Convolution parameters of one image axis.
 #[derive(Clone, Copy, Debug, Hash, PartialEq, Eq)]
 pub(super) struct Axis {
-    /// Pixels of the input.
+    /// Input pixels.
     pub input: usize,
-    /// Pixels of the output.
+    /// Output pixels.
     pub output: usize,
-    /// Weights.
+    /// Kernel size.
     pub kernel: usize,
-    /// Pixels of the input from one of the output to the next.
+    /// Stride, input pixels.
     pub stride: usize,
-    /// Pixels of the input from one weight to the next.
+    /// Dilation, input pixels.
     pub dilation: usize,
-    /// Zeros before the first pixel of the input.
+    /// Zero padding before the input.
     pub padding: usize,
 }
 
 impl Axis {
-    /// Number of planes: every `stride`-th pixel is in the same, so that those of neighbours stand side by side.
+    /// Number of planes: every `stride`-th pixel is in the same plane, so that adjacent outputs are contiguous.
     fn phases(self) -> usize {
         if self.kernel > 1 { self.stride } else { 1 }
     }
 
-    /// The plane of a weight and the shift in it.
+    /// Plane of a weight and the shift in it.
     fn tap(self, weight: usize) -> (usize, usize) {
         let at = weight * self.dilation;
         (at % self.stride, at / self.stride)
     }
 
-    /// Pixels of a plane beyond those of the output.
+    /// Pixels of a plane beyond the output.
     fn halo(self) -> usize {
         self.tap(self.kernel.saturating_sub(1)).1
     }
 
-    /// Place in the input of a pixel of a plane.
+    /// Input position of a plane's pixel.
     fn place(self, phase: usize, pixel: usize) -> Option<usize> {
         let place = pixel.checked_mul(self.stride)?.checked_add(phase)?;
         let place = place.checked_sub(self.padding)?;
@@ -51,18 +51,18 @@ impl Axis {
     }
 }
 
-/// Layout of an image in bands of rows of the output, whose planes stay near the processor.
+/// Layout of an image in bands of output rows whose planes fit the cache.
 #[derive(Clone, Debug, Hash, PartialEq, Eq)]
 pub(super) struct Layout {
     channels: usize,
     rows: Axis,
     columns: Axis,
-    /// Rows of the output in a band.
+    /// Output rows per band.
     pub band: usize,
 }
 
 impl Layout {
-    /// None where planes would be too large: weights far apart, or a stride of many pixels.
+    /// `None` if planes would be too large: large dilation or stride.
     pub fn new(channels: usize, rows: Axis, columns: Axis) -> Option<Self> {
         for axis in [rows, columns] {
             let apart = axis.kernel.checked_sub(1)?.checked_mul(axis.dilation)?;
@@ -87,7 +87,7 @@ impl Layout {
         })
     }
 
-    /// Columns of a plane: a position of a band is its row times this, and its column.
+    /// Row pitch of a plane: an output position in a band is row times pitch plus column.
     pub fn width(&self) -> usize {
         self.columns.output + self.columns.halo()
     }
@@ -96,7 +96,7 @@ impl Layout {
         (self.band + self.rows.halo()) * self.width()
     }
 
-    /// Values of a channel. An odd number of lines of a cache, so that channels do not drive each other out of it.
+    /// Values per channel: an odd number of cache lines, which avoids conflicts between channels.
     pub fn channel(&self) -> usize {
         let all = self.rows.phases() * self.columns.phases() * self.plane();
         all.next_multiple_of(32) + 16
@@ -114,7 +114,7 @@ impl Layout {
         taps
     }
 
-    /// Fills the planes of a band of the output with the image.
+    /// Fills the planes of an output band from the image.
     pub fn fill(&self, image: &[f32], band: &Range<usize>, planes: &mut Vec<f32>) {
         planes.resize(self.channels * self.channel() + MAX_LANES, 0.0);
         let image = image.chunks_exact((self.rows.input * self.columns.input).max(1));
@@ -134,7 +134,7 @@ impl Layout {
         }
     }
 
-    /// Fills a row of a plane with the pixels of a row of the image that belong to it.
+    /// Fills a row of a plane from a row of the image.
     fn fill_row(&self, from: &[f32], phase: usize, to: &mut [f32]) {
         let Axis {
             stride, padding, ..
@@ -148,7 +148,7 @@ impl Layout {
         zeros.fill(0.0);
         match stride {
             1 => to.copy_from_slice(from.get(..to.len()).unwrap_or_default()),
-            // Pairs are taken apart many at a time.
+            // Deinterleaving pairs is vectorised.
             2 => {
                 let (pairs, last) = from.as_chunks::<2>();
                 for (to, [from, _]) in to.iter_mut().zip(pairs) {

@@ -1,4 +1,4 @@
-//! Operators of ours in the place of those of tract that take long.
+//! Replacement of slow tract operators by our own.
 
 use tract_onnx::prelude::*;
 use tract_onnx::tract_hir::internal::*;
@@ -12,13 +12,13 @@ use super::convolution::{Convolution, packed};
 use super::planes::{Axis, Layout};
 use super::resize::Resize;
 
-/// Fewest pixels of an output that are worth it.
+/// Smallest output size (pixels) worth replacing.
 const MIN_PIXELS: usize = 64;
 
-/// The model with operators of ours, decluttered.
+/// Decluttered model with our operators.
 pub(super) fn replaced(mut model: TypedModel) -> TractResult<TypedModel> {
     let convolutions = Rewriter::default().with_rule_for("convolution", convolution);
-    // As it declutters, tract makes matrix products of convolutions of single pixels, and takes norms into the others.
+    // Decluttering converts single-pixel convolutions to matrix products, and folds norms into the others.
     convolutions.rewrite(&false, &mut model)?;
     let mut model = model.into_decluttered()?;
     let rest =
@@ -90,7 +90,7 @@ fn convolution(last: &bool, model: &TypedModel, node: &TypedNode, name: &str, op
     Ok(Some(patch))
 }
 
-/// True if a node is followed by nothing but a factor or term, as by a norm.
+/// True if the only successor of a node is a scale or offset, as of a norm.
 fn is_scaled(model: &TypedModel, node: &TypedNode) -> bool {
     let mut after = node.outputs.iter().flat_map(|output| &output.successors);
     let (Some(next), None) = (after.next(), after.next()) else {

@@ -1,4 +1,4 @@
-//! Images scaled with linear interpolation: rows first, then columns, where tract passes over all values per tap.
+//! Linear image resizing: rows first, then columns, in place of tract's pass over all values per tap.
 
 use std::cell::RefCell;
 
@@ -8,23 +8,23 @@ use tract_onnx::tract_hir::internal::*;
 use tract_onnx::tract_hir::tract_core::op_out_of_plan;
 use tract_onnx::tract_hir::tract_core::ops::nn::resize::{self, AxisPlan};
 
-/// Rows and columns of images (1 x channels x rows x columns) scaled.
+/// Resizing of rows and columns of images (1 x channels x rows x columns).
 #[derive(Clone, Debug, Hash, PartialEq, Eq)]
 pub(super) struct Resize {
-    /// Operator of tract, which knows the coordinates.
+    /// Operator of tract, which computes the coordinates.
     pub asked: resize::Resize,
-    /// Bits of the scales of rows and columns.
+    /// Bits of the row and column scales.
     pub scales: [u32; 2],
     /// Shape of the output.
     pub output: [usize; 4],
 }
 
 thread_local! {
-    /// Rows of a channel, scaled: memory of this size would be fetched anew from the system each time.
+    /// Resized rows of a channel, reused: buffers of this size would be allocated from the system each time.
     static SCRATCH: RefCell<Vec<f32>> = const { RefCell::new(Vec::new()) };
 }
 
-/// The two values that each output lies between, and their weights.
+/// Two source indices per output, and their weights.
 fn taps(plan: &AxisPlan) -> Vec<([usize; 2], [f32; 2])> {
     let (places, _) = plan.indices.as_chunks::<2>();
     let (weights, _) = plan.weights.as_chunks::<2>();
@@ -53,7 +53,7 @@ impl EvalOp for Resize {
     fn eval(&self, _: &EvalContext, inputs: TVec<TValue>) -> TractResult<TVec<TValue>> {
         let input = args_1!(inputs);
         let &[_, _, rows, columns] = input.shape() else {
-            bail!("{:?} is no image", input.shape());
+            bail!("{:?} is not an image", input.shape());
         };
         let [_, _, height, width] = self.output;
         let [vertical, horizontal] = self.scales.map(f32::from_bits);

@@ -1,20 +1,20 @@
-//! Weighted sums of shifted rows: the inner loop of a convolution, with the vectors of the processor that it runs on.
+//! Weighted sums of shifted rows: the inner loop of a convolution, vectorised for the running processor.
 
 use pulp::{Simd, WithSimd};
 
-/// Outputs that are summed at once: each value that is read counts for all of them.
+/// Outputs summed together: each loaded value is used for all of them.
 pub(super) const OUTPUTS: usize = 4;
-/// Most positions that are summed at once; so many values are read beyond the last, and sums written.
+/// Limit of positions summed together; as many values are read beyond the last, and sums written.
 pub(super) const MAX_LANES: usize = 64;
 
-/// The sums of some outputs at all positions: position `p` of a row is the sum of `planes[at + p]` times the weight
-/// over all taps, where `at` is the offset of the tap in its channel.
+/// Sums of some outputs at all positions: at position `p` the sum over all taps of `planes[at + p]` times the weight,
+/// where `at` is the offset of the tap in its channel.
 pub(super) struct Sums<'a> {
-    /// Weight of each output at each tap, all taps of the first channel, all of the second and so on.
+    /// Weight of each output at each tap, channel by channel.
     pub weights: &'a [[f32; OUTPUTS]],
     /// Bias of each output.
     pub bias: [f32; OUTPUTS],
-    /// Values of all channels, one after the other.
+    /// Values of all channels in sequence.
     pub planes: &'a [f32],
     /// Values of each channel in `planes`.
     pub channel: usize,
@@ -22,7 +22,7 @@ pub(super) struct Sums<'a> {
     pub taps: &'a [usize],
     /// Number of positions.
     pub positions: usize,
-    /// A row of each output, of `positions` and [`MAX_LANES`] more.
+    /// One row per output, of `positions` plus [`MAX_LANES`].
     pub rows: &'a mut [f32],
 }
 
@@ -31,7 +31,7 @@ impl WithSimd for Sums<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        // As many sums as there are registers for, beside what is read.
+        // As many sums as registers, besides the loaded values.
         if S::REGISTER_COUNT >= 32 {
             self.of_all::<S, 4>(simd);
         } else {
@@ -57,7 +57,7 @@ impl Sums<'_> {
         }
     }
 
-    /// The sums from a position on.
+    /// Sums from a position on.
     #[inline(always)]
     fn at<S: Simd, const N: usize>(&self, simd: S, begin: usize) -> [[S::f32s; N]; OUTPUTS] {
         let mut sums = self.bias.map(|bias| [simd.splat_f32s(bias); N]);

@@ -1,4 +1,4 @@
-//! The topics of a headset that clients may publish on: a fixed table.
+//! Headset topics that clients may publish on: a fixed table.
 
 use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::headset::HeadsetMesh;
@@ -13,19 +13,19 @@ use super::mesh_chunks::in_chunks;
 use crate::viewer_server::inputs::{Input, InputRefusal};
 use crate::viewer_server::offer::OpenTopic;
 
-/// Reads a message and publishes it.
+/// Decodes and publishes a message.
 type Pass = Box<dyn Fn(&Input) -> Result<(), InputRefusal> + Send>;
 
-/// The way of each topic's messages to ROS.
+/// Publishers of the headset topics.
 #[derive(Default)]
 pub struct HeadsetTopics {
-    /// Place of the first in the offer.
+    /// Index of the first one in the offer.
     first: usize,
     passes: Vec<Pass>,
 }
 
 impl HeadsetTopics {
-    /// Adds the topics, with messages of at most so many bytes, to those that are open.
+    /// Adds the topics with a limit of message size to the open topics.
     pub fn new(
         node: &Node,
         max_bytes: usize,
@@ -59,7 +59,7 @@ impl HeadsetTopics {
         Ok(Self { first, passes })
     }
 
-    /// Reads a message and publishes it on its topic.
+    /// Decodes a message and publishes it on its topic.
     pub fn publish(&self, input: &Input) -> Result<(), InputRefusal> {
         let pass = input.topic.checked_sub(self.first);
         let pass = pass.and_then(|number| self.passes.get(number));
@@ -67,7 +67,7 @@ impl HeadsetTopics {
     }
 }
 
-/// The table as it grows.
+/// Table under construction.
 struct Table<'a> {
     node: &'a Node,
     max_bytes: usize,
@@ -104,7 +104,7 @@ impl Table<'_> {
 
 fn sent(published: Result<(), PublishError>) -> Result<(), InputRefusal> {
     published.map_err(|error| {
-        log::debug!("a message for the headset was not published: {error}");
+        log::debug!("headset message not published: {error}");
         InputRefusal::NotSent
     })
 }

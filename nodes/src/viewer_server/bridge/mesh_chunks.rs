@@ -1,16 +1,16 @@
-//! Surfaces of a mesh that a client sends whole, in the chunks in which they go on.
+//! Chunking of mesh surfaces that a client sends as a whole.
 
 use lattice_msgs::headset::HeadsetMesh;
 
 use crate::convert::headset_mesh::{self, chunks_for};
 use crate::viewer_server::inputs::InputRefusal;
 
-/// Most bytes of session, surface and frame in all: every chunk has them.
+/// Limit of bytes of session, surface and frame names, which every chunk repeats.
 const NAMES_BYTES: usize = 2_000;
-/// Most chunks of a surface: those that a reader may still ask for again.
+/// Limit of chunks per surface, within the history of the publisher.
 const MAX_CHUNKS: usize = 1000;
 
-/// A surface in chunks; one that is short enough, or a chunk already, as it is.
+/// Splits a surface into chunks; a short one, or a chunk, is unchanged.
 pub(super) fn in_chunks(mesh: HeadsetMesh) -> Result<Vec<HeadsetMesh>, InputRefusal> {
     let names = mesh.session.len() + mesh.surface.len() + mesh.header.frame_id.len();
     if names > NAMES_BYTES {

@@ -1,5 +1,5 @@
-//! The bridge from clients to nodes: a fixed table of services, parameters of named nodes, a topic of goals, and
-//! those of a headset.
+//! Bridge from clients to nodes: a fixed table of services, parameters of configured nodes, a goal topic, and
+//! the headset topics.
 
 mod headset;
 mod mesh_chunks;
@@ -15,70 +15,70 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::rcl_interfaces::ParameterEvent;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{CallError, Load, Node, Publisher, Subscription};
+use lattice_runtime::{CallError, Node, Publisher, Subscription, SubscriptionExecutor};
 
 pub use self::headset::HeadsetTopics;
 use self::parameters::Parameters;
-use super::desk::Ask;
-use super::hub::Hub;
+use super::broadcaster::Broadcaster;
+use super::client_session::BridgeRequest;
 use super::inputs::{Input, InputRefusal, Inputs};
 use super::offer::{Offer, OpenTopic};
 use super::outbox::Outgoing;
 use super::protocol::{parameter_values, service_failure, service_response, status};
 use crate::start::NodeError;
 
-/// Time for an answer of a node.
+/// Timeout of a node's reply.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Longest answer that is passed on, and longest message of a client.
+/// Largest forwarded reply, and largest client message, bytes.
 const MAX_ANSWER_BYTES: usize = 1 << 20;
 
-/// Answers what clients ask.
+/// Executes requests of clients.
 pub trait Bridge: Send + Sync {
-    /// All that clients may ask for.
+    /// Capabilities offered to clients.
     fn offer(&self) -> &Offer;
 
-    /// Asks; gives messages for the client. Dropping the future ends the question.
-    fn ask(&self, ask: Ask) -> BoxFuture<'static, Vec<Outgoing>>;
+    /// Executes a request; returns messages for the client. Dropping the future cancels it.
+    fn request(&self, request: BridgeRequest) -> BoxFuture<'static, Vec<Outgoing>>;
 
-    /// Hands a client's message for a headset's topic over, at once, or says why not.
+    /// Queues a client's message for a headset topic without blocking, or returns the reason for its rejection.
     fn take(&self, client: u64, input: Input) -> Result<(), InputRefusal>;
 
-    /// Counters of such messages.
+    /// Counters of headset messages.
     fn inputs(&self) -> &Inputs;
 }
 
-/// Nodes that clients reach.
+/// Nodes accessible to clients.
 #[derive(Clone, Debug)]
-pub struct Reach {
-    /// True if clients may change something.
+pub struct BridgeOptions {
+    /// True if clients may change state.
     pub allow_write: bool,
-    /// The mapper.
+    /// Name of the mapper.
     pub mapper: String,
-    /// The player of logs.
+    /// Name of the bag player.
     pub player: String,
-    /// Nodes whose parameters are shown and set.
+    /// Nodes whose parameters are accessible.
     pub parameter_nodes: Vec<String>,
     /// Topic of goals (`geometry_msgs/PoseStamped`).
     pub goal_topic: String,
-    /// Bounds of what clients may publish for a headset, if they may.
-    pub headset: Option<HeadsetReach>,
+    /// Limits of headset messages from clients; `None`: not allowed.
+    pub headset: Option<HeadsetLimits>,
 }
 
-/// Bounds of what clients may publish for a headset.
+/// Limits of headset messages from clients.
 #[derive(Clone, Debug)]
-pub struct HeadsetReach {
+pub struct HeadsetLimits {
     /// Longest message, bytes.
     pub message_bytes: usize,
-    /// Most bytes of a client in a second.
+    /// Rate limit per client, bytes per second.
     pub bytes_per_s: usize,
-    /// The node that calibrates.
+    /// Name of the calibration node.
     pub calibrator: String,
 }
 
-/// Hands a message of a client over to the node's thread; false if there is no room.
+/// Sends a client's message to the node's thread; false if the inbox is full.
 pub type HandOver = Box<dyn Fn(u64, Input) -> bool + Send + Sync>;
 
-/// A bridge to nodes of ROS.
+/// Bridge to ROS nodes.
 pub struct NodeBridge {
     offer: Offer,
     clients: services::Clients,
@@ -90,12 +90,12 @@ pub struct NodeBridge {
 }
 
 impl NodeBridge {
-    /// A bridge that offers what `reach` allows, and tells the hub of parameters that change. What clients publish
-    /// for a headset is handed over, for the topics that are given back.
+    /// Creates a bridge limited by `reach`, which notifies the broadcaster of parameter changes. Headset messages of
+    /// clients are passed to `hand_over`, and published by the returned topics.
     pub fn new(
         node: &Node,
-        reach: &Reach,
-        hub: &Arc<Hub>,
+        reach: &BridgeOptions,
+        broadcaster: &Arc<Broadcaster>,
         (inputs, hand_over): (Arc<Inputs>, HandOver),
     ) -> Result<(Self, HeadsetTopics), NodeError> {
         let (services, clients) = services::of(node, reach)?;
@@ -125,15 +125,20 @@ impl NodeBridge {
         let parameters = Arc::new(Parameters::new(node, nodes)?);
         let mut events = None;
         if reach.allow_write {
-            // The hub holds the bridge.
-            let (hub, parameters) = (Arc::downgrade(hub), Arc::clone(&parameters));
+            // Weak: the broadcaster owns the bridge.
+            let (broadcaster, parameters) = (Arc::downgrade(broadcaster), Arc::clone(&parameters));
             let tell = move |event: Arc<ParameterEvent>| {
-                if let Some(hub) = hub.upgrade() {
-                    hub.parameters_changed(&parameters.changed(&event));
+                if let Some(broadcaster) = broadcaster.upgrade() {
+                    broadcaster.parameters_changed(&parameters.changed(&event));
                 }
             };
             let qos = Qos::PARAMETER_EVENTS;
-            events = Some(node.subscribe("/parameter_events", qos, Load::Small, tell)?);
+            events = Some(node.subscribe(
+                "/parameter_events",
+                qos,
+                SubscriptionExecutor::Shared,
+                tell,
+            )?);
         }
         let bridge = Self {
             offer,
@@ -147,12 +152,12 @@ impl NodeBridge {
         Ok((bridge, topics))
     }
 
-    /// Publishes a goal: the only topic whose messages are questions.
+    /// Publishes a goal: the only published topic with replies.
     fn publish(&self, message: &[u8]) -> Result<(), String> {
         let message: PoseStamped = lattice_msgs::cdr::from_slice(message).map_err(words)?;
         match &self.goals {
             Some(goals) => goals.publish(message).map_err(words),
-            None => Err("goals are not taken".to_owned()),
+            None => Err("publishing goals is not enabled".to_owned()),
         }
     }
 }
@@ -173,9 +178,9 @@ impl Bridge for NodeBridge {
         &self.inputs
     }
 
-    fn ask(&self, ask: Ask) -> BoxFuture<'static, Vec<Outgoing>> {
-        match ask {
-            Ask::Call {
+    fn request(&self, request: BridgeRequest) -> BoxFuture<'static, Vec<Outgoing>> {
+        match request {
+            BridgeRequest::Call {
                 service,
                 call,
                 request,
@@ -185,26 +190,30 @@ impl Bridge for NodeBridge {
                 Box::pin(async move {
                     let answer = match answer {
                         Some(answer) => answer.await.map_err(words),
-                        None => Err("there is no such service".to_owned()),
+                        None => Err("unknown service".to_owned()),
                     };
                     vec![match answer {
                         Ok(cdr) if cdr.len() <= MAX_ANSWER_BYTES => {
                             Outgoing::Binary(service_response(service, call, &cdr))
                         }
-                        Ok(_) => Outgoing::Text(service_failure(service, call, "a long answer")),
+                        Ok(_) => Outgoing::Text(service_failure(
+                            service,
+                            call,
+                            "the reply exceeds 1 MiB",
+                        )),
                         Err(why) => Outgoing::Text(service_failure(service, call, &why)),
                     }]
                 })
             }
-            Ask::GetParameters(names, id) => {
+            BridgeRequest::GetParameters(names, id) => {
                 let values = self.parameters.get(names);
                 Box::pin(async move { told(values.await, id) })
             }
-            Ask::SetParameters(parameters, id) => {
+            BridgeRequest::SetParameters(parameters, id) => {
                 let values = self.parameters.set(parameters);
                 Box::pin(async move { told(values.await, id) })
             }
-            Ask::Publish(_, message) => {
+            BridgeRequest::Publish(_, message) => {
                 let problem = self.publish(&message).err();
                 let told = problem.map(|why| Outgoing::Text(status(&why)));
                 Box::pin(async move { told.into_iter().collect() })
@@ -213,7 +222,7 @@ impl Bridge for NodeBridge {
     }
 }
 
-/// Values, and before them what went wrong.
+/// Messages of the problems and of the values.
 fn told(outcome: parameters::Outcome, id: Option<String>) -> Vec<Outgoing> {
     let problems = outcome.problems.iter().map(|why| status(why));
     let values = parameter_values(&outcome.values, id.as_deref());
@@ -224,7 +233,7 @@ fn words(error: impl ToString) -> String {
     error.to_string()
 }
 
-/// The answer to a typed call.
+/// Decoded reply of a call.
 async fn answer<M: RosMessage>(
     call: impl Future<Output = Result<Vec<u8>, CallError>>,
 ) -> Result<M, String> {

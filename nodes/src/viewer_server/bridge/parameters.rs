@@ -1,4 +1,4 @@
-//! Parameters of nodes, over their own services.
+//! Access to node parameters through their services.
 
 use futures::future::{BoxFuture, join_all};
 use lattice_msgs::cdr;
@@ -14,23 +14,23 @@ use super::values::{from_json, to_json};
 use super::{PATIENCE, answer};
 use crate::viewer_server::protocol::Value;
 
-/// Most parameters of a node that are asked for.
+/// Limit of parameters requested per node.
 const MAX_PARAMETERS: usize = 1000;
 
-/// Values, and what went wrong.
+/// Values, and problems.
 #[derive(Default)]
 pub(super) struct Outcome {
     pub values: Vec<Value>,
     pub problems: Vec<String>,
 }
 
-/// The nodes whose parameters are reached.
+/// Accessible nodes.
 pub(super) struct Parameters(Vec<Remote>);
 
-/// One of them.
+/// An accessible node.
 #[derive(Clone)]
 struct Remote {
-    /// Full name and a dot, in front of the names of its parameters.
+    /// Full node name with a dot, the prefix of its parameter names.
     prefix: String,
     list: Client,
     describe: Client,
@@ -55,8 +55,8 @@ impl Parameters {
         names.iter().map(remote).collect::<Result<_, _>>().map(Self)
     }
 
-    /// Values of these parameters; of all that can be changed if none are named. Nodes that are not there
-    /// are left out.
+    /// Values of these parameters, or of all settable ones if none are named. Unavailable nodes
+    /// are skipped.
     pub(super) fn get(&self, names: Vec<String>) -> BoxFuture<'static, Outcome> {
         let all = names.is_empty();
         let of = |remote: &Remote| {
@@ -91,7 +91,7 @@ impl Parameters {
         })
     }
 
-    /// Values of an event of a node, if it is within reach.
+    /// Values of a parameter event, if its node is accessible.
     pub(super) fn changed(&self, event: &ParameterEvent) -> Vec<Value> {
         let prefix = format!("{}.", event.node);
         let all = event.new_parameters.iter().chain(&event.changed_parameters);
@@ -106,7 +106,7 @@ impl Parameters {
         }
     }
 
-    /// Sets each parameter by itself; gives their values after that.
+    /// Sets each parameter individually; returns their new values.
     pub(super) fn set(&self, parameters: Vec<Value>) -> BoxFuture<'static, Outcome> {
         let mut problems = Vec::new();
         let mut works = Vec::new();
@@ -114,7 +114,10 @@ impl Parameters {
             let of = |remote: &&Remote| parameter.name.starts_with(&remote.prefix);
             match self.0.iter().find(of) {
                 Some(remote) => works.push((remote.clone(), parameter)),
-                None => problems.push(format!("{:?} is not within reach", parameter.name)),
+                None => problems.push(format!(
+                    "{:?} is not accessible; see `parameter_nodes`",
+                    parameter.name
+                )),
             }
         }
         Box::pin(async move {
@@ -170,7 +173,8 @@ impl Remote {
         let name = name.unwrap_or_default().to_owned();
         let known = self.raw(std::slice::from_ref(&name)).await?;
         let type_ = known.first().map_or(0, |value| value.type_);
-        let value = from_json(parameter.value, type_).ok_or("not a value of its type")?;
+        let value = from_json(parameter.value, type_)
+            .ok_or("the value does not have the parameter's type")?;
         let parameters = vec![Parameter { name, value }];
         let request = SetParametersRequest { parameters };
         let done: SetParametersResponse = answer(ask(&self.set, &request)).await?;
@@ -185,6 +189,6 @@ fn ask<M: lattice_msgs::RosMessage>(
     client: &Client,
     request: &M,
 ) -> impl Future<Output = Result<Vec<u8>, CallError>> + Send + 'static {
-    // What is not written is not read there, which the answer says.
+    // An encoding failure results in an error reply.
     client.call(cdr::to_vec(request).unwrap_or_default(), PATIENCE)
 }

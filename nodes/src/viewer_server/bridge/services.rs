@@ -1,4 +1,4 @@
-//! The services that clients may call.
+//! Services that clients may call.
 
 use std::time::Duration;
 
@@ -11,16 +11,16 @@ use lattice_msgs::std_srvs::Trigger;
 use lattice_msgs::{RosMessage, RosService};
 use lattice_runtime::{Client, Node, RuntimeError};
 
-use super::{PATIENCE, Reach};
+use super::{BridgeOptions, PATIENCE};
 use crate::viewer_server::protocol::AdvertisedService;
 
-/// Time for the answer of a calibration, which may search for a while.
+/// Timeout of a calibration, which may include a search.
 const CALIBRATION_PATIENCE: Duration = Duration::from_secs(120);
 
-/// Clients of services with the time for their answers.
+/// Service clients with their timeouts.
 pub(super) type Clients = Vec<(Client, Duration)>;
 
-/// The table as it grows.
+/// Table under construction.
 struct Table<'a> {
     node: &'a Node,
     of: &'a str,
@@ -44,10 +44,10 @@ impl Table<'_> {
     }
 }
 
-/// The services, in the order of their ids; those that change something only where that is allowed.
+/// Services in the order of their ids; those that change state only if allowed.
 pub(super) fn of(
     node: &Node,
-    reach: &Reach,
+    reach: &BridgeOptions,
 ) -> Result<(Vec<AdvertisedService>, Clients), RuntimeError> {
     let mut table = Table {
         node,

@@ -1,9 +1,9 @@
-//! Values of parameters in JSON, and as `rcl_interfaces` has them.
+//! Conversion of parameter values between JSON and `rcl_interfaces`.
 
 use lattice_msgs::rcl_interfaces::{ParameterType as Type, ParameterValue};
 use serde_json::{Value as Json, json};
 
-/// The value in JSON, with its type where JSON does not say it; `None`: none, or of bytes.
+/// JSON value, with its type where JSON is ambiguous; `None`: not set, or bytes.
 pub(super) fn to_json(value: ParameterValue) -> Option<(Json, Option<String>)> {
     let (json, kind) = match value.type_ {
         Type::PARAMETER_BOOL => (json!(value.bool_value), None),
@@ -19,7 +19,7 @@ pub(super) fn to_json(value: ParameterValue) -> Option<(Json, Option<String>)> {
     Some((json, kind.map(str::to_owned)))
 }
 
-/// A value of the type that the parameter has; `None` if the JSON is none.
+/// Value of the parameter's type; `None` if the JSON does not match.
 pub(super) fn from_json(json: Json, type_: u8) -> Option<ParameterValue> {
     let mut value = ParameterValue {
         type_,

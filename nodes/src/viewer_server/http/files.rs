@@ -1,8 +1,8 @@
-//! The files of the page, as they stand in `nodes/web/`.
+//! Files of the page, from `nodes/web/`.
 
 /// A file of the page.
 pub struct File {
-    /// Path of the address.
+    /// URL path.
     pub path: &'static str,
     /// Its media type.
     pub media_type: &'static str,
@@ -12,7 +12,7 @@ pub struct File {
 
 const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
 
-/// States files by name and media type.
+/// Lists files by name and media type.
 macro_rules! files {
     ($($path:literal $name:literal $media_type:expr;)*) => {
         &[$(File {
@@ -23,7 +23,7 @@ macro_rules! files {
     };
 }
 
-/// Every path that is answered.
+/// All served files.
 const FILES: &[File] = files! {
     "/" "index.html" "text/html; charset=utf-8";
     "/style.css" "style.css" "text/css; charset=utf-8";
@@ -61,7 +61,7 @@ const FILES: &[File] = files! {
     "/writing.js" "writing.js" JAVASCRIPT;
 };
 
-/// The file of a path.
+/// File at a path.
 pub fn find(path: &str) -> Option<&'static File> {
     FILES.iter().find(|file| file.path == path)
 }

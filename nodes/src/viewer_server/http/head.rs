@@ -1,32 +1,32 @@
-//! Head of a request: its line and the headers that count here.
+//! Request head: request line and relevant headers.
 
 use thiserror::Error;
 
-/// Most bytes of a head.
+/// Limit of head bytes.
 pub const MAX_HEAD_BYTES: usize = 8 << 10;
-/// Most headers of a request.
+/// Limit of headers.
 const MAX_HEADERS: usize = 64;
 
-/// Error of a head that is none. The answer is 400.
+/// Malformed head, answered with 400.
 #[derive(Debug, Error, PartialEq)]
 pub enum HeadError {
-    /// No HTTP.
-    #[error("no HTTP request: {0}")]
+    /// Not HTTP.
+    #[error("not an HTTP request: {0}")]
     Malformed(String),
     /// Longer than [`MAX_HEAD_BYTES`].
     #[error("the head of the request has more than {MAX_HEAD_BYTES} bytes")]
     TooLong,
-    /// A header that must be there once.
-    #[error("the header {0} is there twice")]
+    /// Duplicate header.
+    #[error("duplicate header {0}")]
     Twice(&'static str),
 }
 
-/// A request without its body, of which none is read.
+/// Request head; bodies are not read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Head {
     /// As sent, such as `GET`.
     pub method: String,
-    /// Path of the address, without the query.
+    /// URL path, without the query.
     pub path: String,
     /// Query, without the question mark.
     pub query: String,
@@ -36,18 +36,18 @@ pub struct Head {
     pub origin: Option<String>,
     /// `Cookie`.
     pub cookie: Option<String>,
-    /// True if the connection is to become a WebSocket.
+    /// True for a WebSocket upgrade.
     pub upgrade: bool,
     /// `Sec-WebSocket-Key`.
     pub key: Option<String>,
     /// `Sec-WebSocket-Version`.
     pub version: Option<String>,
-    /// `Sec-WebSocket-Protocol`, all of them.
+    /// `Sec-WebSocket-Protocol`, all values.
     pub protocols: Vec<String>,
 }
 
 impl Head {
-    /// Reads a head from the first bytes of a connection; `None` while its end has not come. Otherwise
+    /// Parses a head from the first bytes of a connection; `None` while it is incomplete. Otherwise
     /// the head and its length.
     pub fn parse(bytes: &[u8]) -> Result<Option<(Head, usize)>, HeadError> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
@@ -79,7 +79,7 @@ impl Head {
     }
 
     fn take(&mut self, header: &httparse::Header) -> Result<(), HeadError> {
-        // Bytes that are no text match nothing.
+        // Non-UTF-8 values match nothing.
         let value = String::from_utf8_lossy(header.value).trim().to_owned();
         let name = header.name.to_ascii_lowercase();
         let once = |field: &mut Option<String>, name| match field.replace(value.clone()) {
@@ -110,7 +110,7 @@ impl Head {
             .find_map(|(key, value)| (key == name).then_some(value))
     }
 
-    /// Value in the query, as sent.
+    /// Raw value of a query parameter.
     pub fn query(&self, name: &str) -> Option<&str> {
         let pairs = self.query.split('&');
         pairs

@@ -1,8 +1,8 @@
-//! The part of HTTP that a page of fixed files and one WebSocket need, without I/O.
+//! HTTP subset for static files and one WebSocket, without I/O.
 
 mod files;
-mod gate;
 mod head;
+mod request_auth;
 
-pub use gate::{Decision, Gate, Response};
 pub use head::{Head, HeadError, MAX_HEAD_BYTES};
+pub use request_auth::{Decision, RequestAuth, Response};

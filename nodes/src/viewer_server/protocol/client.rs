@@ -1,107 +1,107 @@
-//! Messages of a client.
+//! Client messages.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Most entries of a list in one message.
+/// Limit of list entries per message.
 const MAX_LIST: usize = 256;
 
-/// Error of a message of a client. It is told so, and stays connected.
+/// Malformed client message. The client is notified and stays connected.
 #[derive(Debug, Error)]
 pub enum ProtocolError {
-    /// No message of the protocol.
-    #[error("not understood: {0}")]
+    /// Unknown message.
+    #[error("invalid message: {0}")]
     Json(#[from] serde_json::Error),
-    /// A longer list than anybody needs.
-    #[error("{found} entries in one message, at most {MAX_LIST} are taken")]
+    /// List above the limit.
+    #[error("{found} entries in one message, more than {MAX_LIST}")]
     TooMany {
         /// Length of the list.
         found: usize,
     },
-    /// A binary message that is none of the protocol.
+    /// Unknown binary message.
     #[error("a binary message is too short, or of an unknown kind")]
     Binary,
 }
 
-/// A message of a client.
+/// Text message of a client.
 #[derive(Debug, Deserialize, PartialEq)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
 pub enum ClientMessage {
-    /// Wants messages of channels.
+    /// Subscribe to channels.
     Subscribe {
-        /// The wishes.
-        subscriptions: Vec<Wish>,
+        /// Requested subscriptions.
+        subscriptions: Vec<SubscriptionRequest>,
     },
-    /// Wants them no more.
+    /// Unsubscribe.
     Unsubscribe {
         /// Ids of the subscriptions.
         subscription_ids: Vec<u32>,
     },
-    /// Wants values of parameters.
+    /// Read parameters.
     GetParameters {
-        /// Full names; none: all.
+        /// Full names; empty: all.
         #[serde(default)]
         parameter_names: Vec<String>,
-        /// Comes back in the answer.
+        /// Repeated in the reply.
         id: Option<String>,
     },
-    /// Wants other values.
+    /// Set parameters.
     SetParameters {
         /// Names and values.
         parameters: Vec<Value>,
-        /// Comes back in the answer.
+        /// Repeated in the reply.
         id: Option<String>,
     },
-    /// Wants to hear when parameters change.
+    /// Watch parameters.
     SubscribeParameterUpdates {
-        /// Full names; none: all.
+        /// Full names; empty: all.
         #[serde(default)]
         parameter_names: Vec<String>,
     },
-    /// Does no longer.
+    /// Stop watching parameters.
     UnsubscribeParameterUpdates {
-        /// Full names; none: all.
+        /// Full names; empty: all.
         #[serde(default)]
         parameter_names: Vec<String>,
     },
-    /// Will publish.
+    /// Advertise client channels.
     Advertise {
-        /// Its channels.
+        /// The channels.
         channels: Vec<ClientChannel>,
     },
-    /// Will not any more.
+    /// Remove client channels.
     Unadvertise {
         /// Ids of the channels.
         channel_ids: Vec<u32>,
     },
-    /// Wants the graph of nodes.
+    /// Follow the node graph.
     SubscribeConnectionGraph,
-    /// Wants it no more.
+    /// Stop following it.
     UnsubscribeConnectionGraph,
-    /// Anything else, which is not offered.
+    /// Another operation, which is not supported.
     #[serde(other)]
     Other,
 }
 
-/// A subscription that a client wants.
+/// Requested subscription.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
 #[serde(rename_all = "camelCase")]
-pub struct Wish {
-    /// By which the client knows the messages.
+pub struct SubscriptionRequest {
+    /// Subscription id, chosen by the client.
     pub id: u32,
     /// Channel of the server.
     pub channel_id: u32,
 }
 
-/// A parameter with its value.
+/// Parameter value.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 pub struct Value {
-    /// Full name: that of the node, a dot, that in the node.
+    /// Full name: node name, a dot, parameter name.
     pub name: String,
-    /// In JSON.
+    /// JSON value.
     #[serde(default)]
     pub value: serde_json::Value,
-    /// Type that JSON does not say, as `float64`.
+    /// Type that JSON does not express, such as `float64`.
     #[serde(rename = "type", default, skip_serializing_if = "Option::is_none")]
     pub kind: Option<String>,
 }
@@ -110,7 +110,7 @@ pub struct Value {
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(rename_all = "camelCase")]
 pub struct ClientChannel {
-    /// By which its messages name it.
+    /// Channel id, chosen by the client.
     pub id: u32,
     /// Full name of the topic.
     pub topic: String,
@@ -120,21 +120,21 @@ pub struct ClientChannel {
     pub schema_name: String,
 }
 
-/// A binary message of a client.
+/// Binary message of a client.
 #[derive(Debug, PartialEq)]
 pub enum ClientData<'a> {
-    /// A message of a channel of the client's.
+    /// Message on a client channel.
     Message {
         /// The channel.
         channel: u32,
         /// The message.
         payload: &'a [u8],
     },
-    /// A call of a service.
+    /// Service call.
     Call {
-        /// The service.
+        /// Service id.
         service: u32,
-        /// By which the client knows the answer.
+        /// Call id, chosen by the client.
         call: u32,
         /// Must be `cdr`.
         encoding: &'a [u8],
@@ -144,7 +144,7 @@ pub enum ClientData<'a> {
 }
 
 impl<'a> ClientData<'a> {
-    /// Reads a binary message.
+    /// Parses a binary message.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, ProtocolError> {
         Self::read(bytes).ok_or(ProtocolError::Binary)
     }
@@ -173,7 +173,7 @@ impl<'a> ClientData<'a> {
 }
 
 impl ClientMessage {
-    /// Reads a text message.
+    /// Parses a text message.
     pub fn parse(text: &str) -> Result<Self, ProtocolError> {
         let message = serde_json::from_str(text)?;
         let found = match &message {
@@ -207,7 +207,8 @@ mod tests {
 
     #[test]
     fn messages_are_read() {
-        let wishes = [(7, 2), (8, 3)].map(|(id, channel_id)| Wish { id, channel_id });
+        let wishes =
+            [(7, 2), (8, 3)].map(|(id, channel_id)| SubscriptionRequest { id, channel_id });
         let subscriptions = wishes.to_vec();
         let message = ClientMessage::parse(SUBSCRIBE).unwrap();
         assert_eq!(message, ClientMessage::Subscribe { subscriptions });

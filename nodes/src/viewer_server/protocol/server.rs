@@ -1,13 +1,13 @@
-//! Messages of the server.
+//! Server messages.
 
 use serde::Serialize;
 use serde_json::json;
 
-/// A channel as clients see it.
+/// Advertised channel.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Advertised {
-    /// By which clients subscribe.
+    /// Channel id.
     pub id: u32,
     /// Full name of the topic.
     pub topic: String,
@@ -17,29 +17,29 @@ pub struct Advertised {
     pub schema_name: &'static str,
     /// Always `ros2msg`.
     pub schema_encoding: &'static str,
-    /// Text of the type with all that it holds.
+    /// Definition of the type with its dependencies.
     pub schema: String,
 }
 
-/// A service as clients see it.
+/// Advertised service.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct AdvertisedService {
-    /// By which clients call it.
+    /// Service id.
     pub id: u32,
     /// Full name.
     pub name: String,
     /// Type, such as `std_srvs/srv/Empty`.
     #[serde(rename = "type")]
     pub type_name: &'static str,
-    /// Text of the request's type with all that it holds.
+    /// Definition of the request type with its dependencies.
     pub request_schema: String,
-    /// The same of the answer's.
+    /// Definition of the response type with its dependencies.
     pub response_schema: String,
 }
 
-/// The first message. `session` is another one after each start, so that clients begin anew. No
-/// distribution of ROS is named: viewers would take its definitions for ours. `source`: `live` or `file`.
+/// First message. `session` differs after each start, so that clients restart. No ROS distribution is
+/// named: viewers would use its message definitions instead of ours. `source`: `live` or `file`.
 pub fn server_info(session: &str, capabilities: &[&str], source: &str) -> String {
     json!({
         "op": "serverInfo",
@@ -52,22 +52,22 @@ pub fn server_info(session: &str, capabilities: &[&str], source: &str) -> String
     .to_string()
 }
 
-/// The channels that there are.
+/// Advertises channels.
 pub fn advertise(channels: &[&Advertised]) -> String {
     json!({ "op": "advertise", "channels": channels }).to_string()
 }
 
-/// A warning for the person at the client.
+/// Warning shown to the user of the client.
 pub fn status(message: &str) -> String {
     json!({ "op": "status", "level": 1, "message": message }).to_string()
 }
 
-/// The services that there are.
+/// Advertises services.
 pub fn advertise_services(services: &[AdvertisedService]) -> String {
     json!({ "op": "advertiseServices", "services": services }).to_string()
 }
 
-/// An answer to a call: operation 3, service, call, encoding, CDR.
+/// Service response: operation 3, service, call, encoding, CDR.
 pub fn service_response(service: u32, call: u32, cdr: &[u8]) -> Vec<u8> {
     let encoding = b"cdr";
     let mut bytes = vec![3];
@@ -79,30 +79,30 @@ pub fn service_response(service: u32, call: u32, cdr: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A call that came to nothing.
+/// Failed service call.
 pub fn service_failure(service: u32, call: u32, message: &str) -> String {
     json!({ "op": "serviceCallFailure", "serviceId": service, "callId": call, "message": message })
         .to_string()
 }
 
-/// Names of topics or services, with the names of nodes.
+/// Topic or service names, each with node names.
 type Linked<'a> = Vec<(&'a str, Vec<&'a str>)>;
 
-/// Changes of the graph of nodes.
+/// Changes of the node graph.
 pub struct GraphUpdate<'a> {
-    /// Topics with other publishers than before, and all of these.
+    /// Topics with changed publishers, with all of them.
     pub published: Linked<'a>,
-    /// Topics with other subscribers.
+    /// Topics with changed subscribers.
     pub subscribed: Linked<'a>,
-    /// Services with other servers.
+    /// Services with changed servers.
     pub services: Linked<'a>,
-    /// Topics that nobody has any more.
+    /// Removed topics.
     pub removed_topics: Vec<&'a String>,
-    /// Services that nobody serves any more.
+    /// Removed services.
     pub removed_services: Vec<&'a String>,
 }
 
-/// Changes of the graph.
+/// Graph update message.
 pub fn connection_graph_update(update: &GraphUpdate<'_>) -> String {
     let list = |all: &Linked<'_>, ids: &str| -> Vec<serde_json::Value> {
         let entry = |(name, nodes): &(&str, Vec<&str>)| json!({ "name": name, ids: nodes });
@@ -119,7 +119,7 @@ pub fn connection_graph_update(update: &GraphUpdate<'_>) -> String {
     .to_string()
 }
 
-/// Values of parameters.
+/// Parameter values message.
 pub fn parameter_values(parameters: &[impl Serialize], id: Option<&str>) -> String {
     let mut message = json!({ "op": "parameterValues", "parameters": parameters });
     if let (Some(id), Some(fields)) = (id, message.as_object_mut()) {
@@ -128,7 +128,7 @@ pub fn parameter_values(parameters: &[impl Serialize], id: Option<&str>) -> Stri
     message.to_string()
 }
 
-/// A message of a channel: operation 1, subscription, time of arrival, CDR.
+/// Message data: operation 1, subscription, time of arrival, CDR.
 pub fn message_data(subscription: u32, stamp_ns: u64, cdr: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(13 + cdr.len());
     bytes.push(1);

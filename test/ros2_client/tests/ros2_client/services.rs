@@ -10,7 +10,7 @@ use lattice_msgs::rcl_interfaces::{GetParametersRequest, GetParametersResponse};
 use lattice_msgs::std_srvs::{Trigger, TriggerRequest, TriggerResponse};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Runtime};
+use lattice_runtime::{Runtime, SubscriptionExecutor};
 use ros2_client::qos::History;
 use ros2_client::{Message, Name, Node, NodeEvent, ServiceMapping, ServiceTypeName};
 
@@ -141,7 +141,12 @@ fn answered_and_lost(requests: usize) -> (usize, usize) {
     };
     let node = runtime.node("mapper").unwrap();
     let _diagnostics = node
-        .subscribe("/diagnostics", Qos::DIAGNOSTICS, Load::Small, hear)
+        .subscribe(
+            "/diagnostics",
+            Qos::DIAGNOSTICS,
+            SubscriptionExecutor::Shared,
+            hear,
+        )
         .unwrap();
     let mut peer = peer(&domain);
     let type_name = ServiceTypeName::new(TRIGGER.0, TRIGGER.1);

@@ -4,7 +4,7 @@ use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
 use lattice_msgs::std_msgs::String as RosString;
-use lattice_runtime::Load;
+use lattice_runtime::SubscriptionExecutor;
 use lattice_runtime::env::TransportKind;
 use lattice_test::domain::TestDomain;
 
@@ -34,7 +34,9 @@ fn a_crowd_of_participants_hears_the_last_one() {
         let handler = move |message: std::sync::Arc<RosString>| {
             let _ = sender.send(message.data.clone());
         };
-        let _out = node.subscribe("/said", QOS, Load::Small, handler).unwrap();
+        let _out = node
+            .subscribe("/said", QOS, SubscriptionExecutor::Shared, handler)
+            .unwrap();
         let (sender, joined) = channel();
         publisher.on_subscriber_joined(move || {
             let _ = sender.send(());

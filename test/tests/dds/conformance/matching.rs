@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, channel};
 use lattice_msgs::sensor_msgs::{Imu, PointCloud2};
 use lattice_msgs::std_msgs::String as RosString;
 use lattice_runtime::qos::{Durability, Qos, Reliability};
-use lattice_runtime::{Load, Node, Runtime, Subscription};
+use lattice_runtime::{Node, Runtime, Subscription, SubscriptionExecutor};
 use lattice_test::domain::TestDomain;
 
 use super::{PATIENCE, Transport, pairs, runtime};
@@ -52,7 +52,7 @@ fn hear(node: &Node, topic: &str, qos: Qos) -> (Subscription, Receiver<Arc<RosSt
     let handler = move |message| {
         let _ = sender.send(message);
     };
-    let subscription = node.subscribe(topic, qos, Load::Small, handler);
+    let subscription = node.subscribe(topic, qos, SubscriptionExecutor::Shared, handler);
     (subscription.unwrap(), heard)
 }
 
@@ -106,7 +106,9 @@ fn samples_of_every_size_arrive_whole() {
         let publisher = ends.from.publisher::<PointCloud2>("points", qos).unwrap();
         let (sender, heard) = channel();
         let handler = move |message: Arc<PointCloud2>| drop(sender.send(message));
-        let subscription = ends.to.subscribe("points", qos, Load::Large, handler);
+        let subscription =
+            ends.to
+                .subscribe("points", qos, SubscriptionExecutor::Dedicated, handler);
         let _subscription = subscription.unwrap();
         let (sender, joined) = channel();
         publisher.on_subscriber_joined(move || {

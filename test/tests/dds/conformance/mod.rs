@@ -21,7 +21,7 @@ use lattice_msgs::std_msgs::String as RosString;
 use lattice_runtime::env::{Network, TransportKind};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Node, Publisher, Runtime, Subscription};
+use lattice_runtime::{Node, Publisher, Runtime, Subscription, SubscriptionExecutor};
 use lattice_test::domain::{TestDomain, localhost_only};
 
 /// Long enough for a loaded machine; a test that passes does not wait for it.
@@ -125,7 +125,7 @@ fn echo() {
         let _ = out.publish(message);
     };
     let _heard = node
-        .subscribe::<RosString>("/heard", QOS, Load::Small, say_again)
+        .subscribe::<RosString>("/heard", QOS, SubscriptionExecutor::Shared, say_again)
         .unwrap();
     let _served = node
         .service_trigger("~/reset", || (true, String::new()))
@@ -154,7 +154,9 @@ impl Talk {
         let handler = move |message: std::sync::Arc<RosString>| {
             let _ = sender.send(message.data.clone());
         };
-        let subscription = node.subscribe("/said", QOS, Load::Small, handler).unwrap();
+        let subscription = node
+            .subscribe("/said", QOS, SubscriptionExecutor::Shared, handler)
+            .unwrap();
         Self {
             publisher,
             heard,

@@ -13,7 +13,7 @@ use lattice_msgs::std_msgs::String as RosString;
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Node, Publisher, RawPublisher, Runtime, Subscription};
+use lattice_runtime::{Node, Publisher, RawPublisher, Runtime, Subscription, SubscriptionExecutor};
 use lattice_test::domain::localhost_only;
 
 use super::{DOMAIN, PATIENCE, TOPICS};
@@ -145,7 +145,9 @@ fn hear(node: &Node, topic: &str, qos: Qos) -> (Subscription, Arc<Mutex<Numbers>
         numbers.last = number;
         numbers.received += 1;
     };
-    let subscription = node.subscribe(topic, qos, Load::Large, note).unwrap();
+    let subscription = node
+        .subscribe(topic, qos, SubscriptionExecutor::Dedicated, note)
+        .unwrap();
     (subscription, numbers)
 }
 
@@ -168,7 +170,12 @@ fn hears() {
         shown.lock().unwrap().extend(values);
     };
     let _diagnostics = node
-        .subscribe("/diagnostics", Qos::DIAGNOSTICS, Load::Small, show)
+        .subscribe(
+            "/diagnostics",
+            Qos::DIAGNOSTICS,
+            SubscriptionExecutor::Shared,
+            show,
+        )
         .unwrap();
     let ended = input_ends();
     let (mut before, mut changed) = ([0; 3], Instant::now());

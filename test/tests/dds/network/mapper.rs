@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Runtime};
+use lattice_runtime::{Runtime, SubscriptionExecutor};
 use lattice_test::clouds::cloud;
 use lattice_test::domain::TestDomain;
 use lattice_test::peer::Nodes;
@@ -55,7 +55,12 @@ fn clouds_that_are_lost_are_counted_as_such() {
         }
     };
     let _diagnostics = node
-        .subscribe("/diagnostics", Qos::DIAGNOSTICS, Load::Small, hear)
+        .subscribe(
+            "/diagnostics",
+            Qos::DIAGNOSTICS,
+            SubscriptionExecutor::Shared,
+            hear,
+        )
         .unwrap();
     let mut drives = Command::new(std::env::current_exe().unwrap());
     drives.args(["--exact", "network::mapper::drives", "--ignored"]);

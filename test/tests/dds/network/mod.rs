@@ -38,7 +38,7 @@ struct Sent {
 
 /// Final counters of a receiver for one topic.
 #[derive(Debug, Default)]
-struct Heard {
+struct Received {
     first: u64,
     last: u64,
     received: u64,
@@ -117,7 +117,7 @@ fn balance(
     percent: u32,
     happens: impl FnOnce(&Machines),
     after: u64,
-) -> Option<BTreeMap<&'static str, (Sent, Heard)>> {
+) -> Option<BTreeMap<&'static str, (Sent, Received)>> {
     let domain = TestDomain::take();
     let loss = Loss::new(percent)?;
     let machines = Machines::new(&domain)?;
@@ -148,7 +148,7 @@ fn balance(
                 dropped,
                 unacknowledged,
             },
-            Heard {
+            Received {
                 first,
                 last,
                 received,
@@ -185,7 +185,7 @@ fn cut(seconds: u64) -> impl FnOnce(&Machines) {
     }
 }
 
-fn lost(books: &BTreeMap<&str, (Sent, Heard)>) -> [u64; 3] {
+fn lost(books: &BTreeMap<&str, (Sent, Received)>) -> [u64; 3] {
     TOPICS.map(|topic| books[topic].1.on_network)
 }
 

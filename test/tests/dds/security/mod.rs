@@ -16,7 +16,7 @@ use lattice_nodes::executables;
 use lattice_runtime::env::Network;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::security::{self, Security};
-use lattice_runtime::{Load, Runtime, RuntimeError, lock};
+use lattice_runtime::{Runtime, RuntimeError, SubscriptionExecutor, lock};
 use lattice_test::domain::TestDomain;
 use lattice_test::python::{python, script};
 
@@ -91,7 +91,9 @@ fn permitted_peers_hear_each_other_and_nobody_else() {
     let before = expected.map(|(peer, word)| peer.count(word));
     let kept_out = || {
         let log = lock(&friend.log);
-        let lines = log.iter().filter(|line| line.contains("is kept out"));
+        let lines = log
+            .iter()
+            .filter(|line| line.contains("is not authenticated"));
         lines.cloned().collect::<Vec<_>>()
     };
     let mut more = 0;
@@ -152,10 +154,7 @@ fn what_cannot_be_secured_is_refused_with_its_reason() {
         ("/expired", "expired"),
         ("/unsigned", "PKCS7"),
         ("/revoked", "certificate revoked"),
-        (
-            "/locked",
-            "locked/key.pem, which security needs, cannot be read",
-        ),
+        ("/locked", "locked/key.pem cannot be read"),
         ("/missing", "missing/identity_ca.cert.pem"),
     ] {
         let error = runtime(&domain, "talk", enclave, Some(ours.enforced()))
@@ -208,7 +207,7 @@ fn the_nodes_run_with_the_permissions_of_the_manual_and_with_no_others() {
         assert!(other.contains("Not Allowed By Security"), "{other}");
         let handler = |_: Arc<RosString>| {};
         assert!(
-            node.subscribe("/camera", QOS, Load::Small, handler)
+            node.subscribe("/camera", QOS, SubscriptionExecutor::Shared, handler)
                 .is_err()
         );
         drop(node);

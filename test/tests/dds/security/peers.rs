@@ -12,7 +12,7 @@ use lattice_msgs::std_msgs::String as RosString;
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Runtime, Subscription, lock, logging};
+use lattice_runtime::{Runtime, Subscription, SubscriptionExecutor, lock, logging};
 use lattice_test::domain::TestDomain;
 
 use super::keystore::Keystore;
@@ -47,7 +47,7 @@ pub fn talk(
         }
     };
     let subscription = node
-        .subscribe(&topic(domain), QOS, Load::Small, handler)
+        .subscribe(&topic(domain), QOS, SubscriptionExecutor::Shared, handler)
         .unwrap();
     let data = word.to_owned();
     let timer = runtime.timer(PERIOD, move || {

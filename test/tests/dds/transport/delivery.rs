@@ -8,7 +8,7 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::String as RosString;
 use lattice_msgs::{RosMessage, cdr};
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Load, Losses, PublishError, RuntimeError};
+use lattice_runtime::{Losses, PublishError, RuntimeError, SubscriptionExecutor};
 
 use super::{PATIENCE, Two, assert_counted, assert_heard, count_to, hear, text, wait_until};
 
@@ -25,7 +25,7 @@ fn small_messages_arrive_in_order() {
     let two = Two::start();
     let qos = Qos::reliable(50);
     let publisher = two.publisher("chatter", qos);
-    let (subscription, heard) = two.hear("chatter", qos, Load::Small);
+    let (subscription, heard) = two.hear("chatter", qos, SubscriptionExecutor::Shared);
     wait_for_match!(publisher, subscription);
     count_to(50, &publisher);
     assert_counted(50, &heard);
@@ -41,7 +41,8 @@ fn clouds_of_two_megabytes_arrive_equal_by_either_qos() {
     let message = cloud(2_000_000);
     for (topic, qos) in [("reliable", Qos::reliable(5)), ("best_effort", Qos::SENSOR)] {
         let publisher = two.publisher::<PointCloud2>(topic, qos);
-        let (subscription, heard) = two.hear::<PointCloud2>(topic, qos, Load::Large);
+        let (subscription, heard) =
+            two.hear::<PointCloud2>(topic, qos, SubscriptionExecutor::Dedicated);
         wait_for_match!(publisher, subscription);
         for _ in 0..3 {
             publisher.publish(Arc::clone(&message)).unwrap();
@@ -55,7 +56,11 @@ fn clouds_of_two_megabytes_arrive_equal_by_either_qos() {
 fn a_burst_longer_than_the_depth_waits_for_its_reader() {
     let two = Two::start();
     let publisher = two.publisher::<PointCloud2>("chunks", Qos::reliable(5));
-    let (_subscription, heard) = two.hear::<PointCloud2>("chunks", Qos::reliable(200), Load::Large);
+    let (_subscription, heard) = two.hear::<PointCloud2>(
+        "chunks",
+        Qos::reliable(200),
+        SubscriptionExecutor::Dedicated,
+    );
     wait_for_subscriber!(publisher);
     let chunk = cloud(50_000);
     for _ in 0..200 {
@@ -73,7 +78,12 @@ fn one_process_shares_the_message_itself() {
     let two = Two::start();
     let other = two.a.node("other").unwrap();
     let publisher = two.publisher::<PointCloud2>("points", Qos::SENSOR);
-    let (_subscription, heard) = hear::<PointCloud2>(&other, "/points", Qos::SENSOR, Load::Large);
+    let (_subscription, heard) = hear::<PointCloud2>(
+        &other,
+        "/points",
+        Qos::SENSOR,
+        SubscriptionExecutor::Dedicated,
+    );
     assert_eq!(publisher.subscriber_count(), 1);
     let message = cloud(1600);
     publisher.publish(Arc::clone(&message)).unwrap();
@@ -88,17 +98,17 @@ fn one_process_shares_the_message_itself() {
 fn a_subscriber_in_the_process_does_not_hold_up_those_outside() {
     let two = Two::start();
     let qos = Qos::reliable(5);
-    for (topic, load, subscribe_first) in [
-        ("first_small", Load::Small, true),
-        ("first_large", Load::Large, true),
-        ("second_small", Load::Small, false),
-        ("second_large", Load::Large, false),
+    for (topic, executor, subscribe_first) in [
+        ("first_small", SubscriptionExecutor::Shared, true),
+        ("first_large", SubscriptionExecutor::Dedicated, true),
+        ("second_small", SubscriptionExecutor::Shared, false),
+        ("second_large", SubscriptionExecutor::Dedicated, false),
     ] {
-        let subscribe = || hear::<RosString>(&two.from, topic, qos, load);
+        let subscribe = || hear::<RosString>(&two.from, topic, qos, executor);
         let before = subscribe_first.then(subscribe);
         let publisher = two.publisher(topic, qos);
         let (_here, heard_here) = before.unwrap_or_else(subscribe);
-        let (there, heard_there) = two.hear(topic, Qos::reliable(100), load);
+        let (there, heard_there) = two.hear(topic, Qos::reliable(100), executor);
         let counted = publisher.clone();
         wait_until(&two.a, move || counted.subscriber_count() == 2);
         count_to(100, &publisher);
@@ -113,7 +123,7 @@ fn a_subscriber_in_the_process_does_not_hold_up_those_outside() {
 #[test]
 fn a_subscription_hears_this_process_and_others() {
     let two = Two::start();
-    let (here, heard) = two.hear("chatter", Qos::DEFAULT, Load::Small);
+    let (here, heard) = two.hear("chatter", Qos::DEFAULT, SubscriptionExecutor::Shared);
     let inside = two.to.publisher("chatter", Qos::DEFAULT).unwrap();
     let outside = two.publisher("chatter", Qos::DEFAULT);
     let here = Arc::new(here);
@@ -134,7 +144,8 @@ fn a_late_joiner_hears_what_was_latched() {
     assert!(publisher.flush(PATIENCE));
     assert_eq!(publisher.sent(), 0, "serialised for nobody");
     for node in [&two.a.node("other").unwrap(), &two.to] {
-        let (_subscription, heard) = hear(node, "origin", Qos::LATCHED, Load::Small);
+        let (_subscription, heard) =
+            hear(node, "origin", Qos::LATCHED, SubscriptionExecutor::Shared);
         assert_heard(&heard, "here");
     }
 }
@@ -143,11 +154,11 @@ fn a_late_joiner_hears_what_was_latched() {
 fn a_second_subscription_hears_only_what_comes_after_it() {
     let two = Two::start();
     let publisher = two.publisher("chatter", Qos::DEFAULT);
-    let (_first, heard_first) = two.hear("chatter", Qos::DEFAULT, Load::Small);
+    let (_first, heard_first) = two.hear("chatter", Qos::DEFAULT, SubscriptionExecutor::Shared);
     wait_for_subscriber!(publisher);
     publisher.publish(text("before")).unwrap();
     assert_heard(&heard_first, "before");
-    let (_second, heard_second) = two.hear("chatter", Qos::DEFAULT, Load::Small);
+    let (_second, heard_second) = two.hear("chatter", Qos::DEFAULT, SubscriptionExecutor::Shared);
     let counted = publisher.clone();
     wait_until(&two.a, move || counted.subscriber_count() == 2);
     publisher.publish(text("after")).unwrap();
@@ -161,7 +172,7 @@ fn raw_messages_arrive_as_they_are() {
     let qos = Qos::reliable(100);
     let raw = |topic, type_name| two.from.raw_publisher(topic, type_name, None, qos);
     let publisher = raw("/chatter", RosString::TYPE).unwrap();
-    let (_there, heard) = two.hear("chatter", qos, Load::Small);
+    let (_there, heard) = two.hear("chatter", qos, SubscriptionExecutor::Shared);
     wait_for_subscriber!(publisher);
     for i in 0..100 {
         let bytes = cdr::to_vec(&text(i)).unwrap();
@@ -182,14 +193,14 @@ fn raw_messages_arrive_as_they_are() {
 #[test]
 fn undecodable_and_long_samples_are_counted_and_the_next_arrives() {
     let two = Two::with_args(&["-p", "max_message_bytes:=1000"]);
-    for (topic, qos, load) in [
-        ("reliable", Qos::DEFAULT, Load::Small),
-        ("best_effort", Qos::INS, Load::Large),
+    for (topic, qos, executor) in [
+        ("reliable", Qos::DEFAULT, SubscriptionExecutor::Shared),
+        ("best_effort", Qos::INS, SubscriptionExecutor::Dedicated),
     ] {
         let name = format!("/{topic}");
         let publisher = two.from.raw_publisher(&name, RosString::TYPE, None, qos);
         let publisher = publisher.unwrap();
-        let (subscription, heard) = two.hear(topic, qos, load);
+        let (subscription, heard) = two.hear(topic, qos, executor);
         wait_for_match!(publisher, subscription);
         let length_lies = vec![0, 1, 0, 0, 255, 255, 255, 255, b'x', 0];
         let not_utf8 = vec![0, 1, 0, 0, 3, 0, 0, 0, 0xff, 0xfe, 0];
@@ -211,9 +222,9 @@ fn a_message_is_decoded_by_who_works_on_it() {
     let handler = move |message| {
         let _ = sender.send(message);
     };
-    let subscription = two
-        .to
-        .subscribe_undecoded("chatter", qos, Load::Small, handler);
+    let subscription =
+        two.to
+            .subscribe_undecoded("chatter", qos, SubscriptionExecutor::Shared, handler);
     let subscription = subscription.unwrap();
     let counts = || (subscription.received(), subscription.undecodable());
     let next = || heard.recv_timeout(PATIENCE).unwrap();
@@ -247,7 +258,9 @@ fn what_a_slow_subscriber_misses_is_counted() {
     let wait = move |_: Arc<PointCloud2>| {
         let _ = opened.recv();
     };
-    let subscription = two.to.subscribe("points", Qos::SENSOR, Load::Large, wait);
+    let subscription =
+        two.to
+            .subscribe("points", Qos::SENSOR, SubscriptionExecutor::Dedicated, wait);
     let subscription = subscription.unwrap();
     wait_for_match!(publisher, subscription);
     // Of each hundred it takes one, and the cache keeps a few.

@@ -4,7 +4,7 @@ use std::sync::mpsc::Receiver;
 
 use lattice_msgs::std_msgs::String as RosString;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Load, Subscription};
+use lattice_runtime::{Subscription, SubscriptionExecutor};
 use lattice_test::domain::TestDomain;
 
 use super::*;
@@ -37,7 +37,7 @@ fn a_late_subscriber_and_a_publisher_that_begins_anew_lose_nothing() {
             (process, node)
         };
         let (_first, first) = start("early");
-        let early = hear::<RosString>(&first, "/numbers", qos, Load::Small);
+        let early = hear::<RosString>(&first, "/numbers", qos, SubscriptionExecutor::Shared);
         let (_second, second) = start("late");
         let mut late: Option<(Subscription, _)> = None;
         let until = |reached: &dyn Fn() -> bool| {
@@ -65,7 +65,8 @@ fn a_late_subscriber_and_a_publisher_that_begins_anew_lose_nothing() {
             }
             send(0..MESSAGES);
             let late = late.get_or_insert_with(|| {
-                let late = hear::<RosString>(&second, "/numbers", qos, Load::Small);
+                let late =
+                    hear::<RosString>(&second, "/numbers", qos, SubscriptionExecutor::Shared);
                 known(2, &late.0);
                 late
             });

@@ -8,7 +8,7 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::std_msgs::String as RosString;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, Node, Publisher, Runtime, Subscription};
+use lattice_runtime::{Node, Publisher, Runtime, Subscription, SubscriptionExecutor};
 use lattice_test::domain::TestDomain;
 
 /// Long enough for a loaded machine; a test that passes does not wait for it.
@@ -52,9 +52,9 @@ impl Two {
         &self,
         topic: &str,
         qos: Qos,
-        load: Load,
+        executor: SubscriptionExecutor,
     ) -> (Subscription, Receiver<Arc<M>>) {
-        hear(&self.to, topic, qos, load)
+        hear(&self.to, topic, qos, executor)
     }
 }
 
@@ -95,14 +95,14 @@ fn hear<M: RosMessage>(
     node: &Node,
     topic: &str,
     qos: Qos,
-    load: Load,
+    executor: SubscriptionExecutor,
 ) -> (Subscription, Receiver<Arc<M>>) {
     let (sender, receiver) = channel();
     let handler = move |message| {
         // The test may have heard enough.
         let _ = sender.send(message);
     };
-    let subscription = node.subscribe::<M>(topic, qos, load, handler).unwrap();
+    let subscription = node.subscribe::<M>(topic, qos, executor, handler).unwrap();
     (subscription, receiver)
 }
 

@@ -13,7 +13,9 @@ use lattice_msgs::std_msgs::String as RosString;
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, PublishError, RuntimeError, StaticTfBroadcaster, logging};
+use lattice_runtime::{
+    PublishError, RuntimeError, StaticTfBroadcaster, SubscriptionExecutor, logging,
+};
 use lattice_test::domain::TestDomain;
 
 use super::{PATIENCE, Two, assert_counted, count_to, runtime, text, wait_until};
@@ -31,7 +33,8 @@ fn static_transforms_go_in_one_message() {
         broadcaster.send([transform]).unwrap();
     }
     let qos = Qos::TF_STATIC_LISTENER;
-    let (_subscription, heard) = two.hear::<TFMessage>("/tf_static", qos, Load::Small);
+    let (_subscription, heard) =
+        two.hear::<TFMessage>("/tf_static", qos, SubscriptionExecutor::Shared);
     let frames = loop {
         let message = heard.recv_timeout(PATIENCE).unwrap();
         let frame = |t: &TransformStamped| (t.child_frame_id.clone(), t.transform.translation.x);
@@ -53,9 +56,13 @@ const INCOMPATIBLE: [(&str, &str); 2] = [
 fn a_qos_that_does_not_match_shows_in_diagnostics() {
     let two = Two::start();
     let _publisher = two.publisher::<Imu>("imu", Qos::INS);
-    let (_subscription, _heard) = two.hear::<Imu>("imu", Qos::reliable(200), Load::Small);
-    let (_diagnostics, heard) =
-        two.hear::<DiagnosticArray>("/diagnostics", Qos::DIAGNOSTICS, Load::Small);
+    let (_subscription, _heard) =
+        two.hear::<Imu>("imu", Qos::reliable(200), SubscriptionExecutor::Shared);
+    let (_diagnostics, heard) = two.hear::<DiagnosticArray>(
+        "/diagnostics",
+        Qos::DIAGNOSTICS,
+        SubscriptionExecutor::Shared,
+    );
     let mut missing = INCOMPATIBLE.to_vec();
     while !missing.is_empty() {
         let message = heard.recv_timeout(PATIENCE).unwrap();
@@ -76,9 +83,13 @@ fn a_qos_that_does_not_match_shows_in_diagnostics() {
 fn another_type_on_a_topic_is_no_match() {
     let two = Two::start();
     let publisher = two.publisher::<RosString>("imu", Qos::reliable(10));
-    let (subscription, _heard) = two.hear::<Imu>("imu", Qos::reliable(10), Load::Small);
-    let (_diagnostics, heard) =
-        two.hear::<DiagnosticArray>("/diagnostics", Qos::DIAGNOSTICS, Load::Small);
+    let (subscription, _heard) =
+        two.hear::<Imu>("imu", Qos::reliable(10), SubscriptionExecutor::Shared);
+    let (_diagnostics, heard) = two.hear::<DiagnosticArray>(
+        "/diagnostics",
+        Qos::DIAGNOSTICS,
+        SubscriptionExecutor::Shared,
+    );
     let mut missing = INCOMPATIBLE.to_vec();
     while !missing.is_empty() {
         count_to(1, &publisher);
@@ -98,7 +109,8 @@ fn another_type_on_a_topic_is_no_match() {
 fn qos_parameters_override_the_code() {
     let two = Two::with_args(&["-p", "qos.imu.reliability:=best_effort"]);
     let publisher = two.publisher::<Imu>("imu", Qos::INS);
-    let (subscription, heard) = two.hear::<Imu>("imu", Qos::reliable(200), Load::Small);
+    let (subscription, heard) =
+        two.hear::<Imu>("imu", Qos::reliable(200), SubscriptionExecutor::Shared);
     wait_for_match!(publisher, subscription);
     publisher.publish(Imu::default()).unwrap();
     heard.recv_timeout(PATIENCE).unwrap();
@@ -124,7 +136,8 @@ fn the_log_of_the_process_is_on_rosout() {
     // Fails if another test was first, which has the same.
     let _ = logging::init(&RosArgs::default(), "logger");
     let two = Two::start();
-    let (_subscription, heard) = two.hear::<Log>("/rosout", Qos::ROSOUT, Load::Small);
+    let (_subscription, heard) =
+        two.hear::<Log>("/rosout", Qos::ROSOUT, SubscriptionExecutor::Shared);
     log::warn!(target: "lattice_nodes::test", "of interest");
     let line = loop {
         let line = heard.recv_timeout(PATIENCE).unwrap();
@@ -140,7 +153,8 @@ fn the_log_of_the_process_is_on_rosout() {
 fn a_second_node_of_the_same_name_is_told_as_rcl_tells_it() {
     let _ = logging::init(&RosArgs::default(), "logger");
     let two = Two::with_args(&["-r", "again:__node:=twin", "-r", "other:__node:=twin"]);
-    let (_subscription, heard) = two.hear::<Log>("/rosout", Qos::ROSOUT, Load::Small);
+    let (_subscription, heard) =
+        two.hear::<Log>("/rosout", Qos::ROSOUT, SubscriptionExecutor::Shared);
     let _nodes = ["other", "again"].map(|name| two.b.node(name).unwrap());
     let line = loop {
         let line = heard.recv_timeout(PATIENCE).unwrap();
@@ -162,7 +176,7 @@ fn shutdown_stops_timers_sends_what_is_queued_and_leaves_at_once() {
     let two = Two::start();
     let qos = Qos::reliable(20);
     let publisher = two.publisher("last", qos);
-    let (subscription, heard) = two.hear("last", qos, Load::Large);
+    let (subscription, heard) = two.hear("last", qos, SubscriptionExecutor::Dedicated);
     wait_for_subscriber!(publisher);
     let (ticks, ticked) = channel();
     let _timer = two.a.timer(Duration::from_millis(1), move || {
@@ -186,13 +200,16 @@ fn shutdown_stops_timers_sends_what_is_queued_and_leaves_at_once() {
 #[test]
 fn the_last_messages_of_the_process_reach_their_handlers() {
     let domain = TestDomain::take();
-    for load in [Load::Small, Load::Large] {
+    for executor in [
+        SubscriptionExecutor::Shared,
+        SubscriptionExecutor::Dedicated,
+    ] {
         let runtime = runtime(&domain, "a", &[]);
         let node = runtime.node("a").unwrap();
         let publisher = node.publisher::<RosString>("last", Qos::DEFAULT).unwrap();
         let (shutdown, (sender, heard)) = (runtime.shutdown_handle(), channel());
         let _subscription = node
-            .subscribe::<RosString>("last", Qos::DEFAULT, load, move |message| {
+            .subscribe::<RosString>("last", Qos::DEFAULT, executor, move |message| {
                 // The end begins while all but the first wait.
                 shutdown.wait();
                 let _ = sender.send(message);
@@ -201,19 +218,22 @@ fn the_last_messages_of_the_process_reach_their_handlers() {
         count_to(100, &publisher);
         runtime.shutdown_handle().request();
         runtime.spin().unwrap();
-        assert_eq!(heard.try_iter().count(), 100, "{load:?}");
+        assert_eq!(heard.try_iter().count(), 100, "{executor:?}");
     }
 }
 
 #[test]
 fn a_handler_that_panics_ends_the_process_in_good_order() {
     let domain = TestDomain::take();
-    for load in [Load::Small, Load::Large] {
+    for executor in [
+        SubscriptionExecutor::Shared,
+        SubscriptionExecutor::Dedicated,
+    ] {
         let runtime = runtime(&domain, "a", &[]);
         let node = runtime.node("a").unwrap();
         let publisher = node.publisher::<RosString>("bomb", Qos::DEFAULT).unwrap();
         let _subscription = node
-            .subscribe::<RosString>("bomb", Qos::DEFAULT, load, |_| panic!("on purpose"))
+            .subscribe::<RosString>("bomb", Qos::DEFAULT, executor, |_| panic!("on purpose"))
             .unwrap();
         publisher.publish(text("tick")).unwrap();
         assert!(matches!(runtime.spin(), Err(RuntimeError::Panicked { .. })));

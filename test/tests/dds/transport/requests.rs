@@ -31,7 +31,12 @@ fn call(client: &Client) -> impl Future<Output = Result<Vec<u8>, CallError>> + S
 #[test]
 fn requests_that_nobody_answers_and_those_without_room_are_counted() {
     let two = Two::start();
-    let (_diagnostics, stated) = hear(&two.from, "/diagnostics", Qos::DIAGNOSTICS, Load::Small);
+    let (_diagnostics, stated) = hear(
+        &two.from,
+        "/diagnostics",
+        Qos::DIAGNOSTICS,
+        SubscriptionExecutor::Shared,
+    );
     // Dropped by its handler.
     let forgets = |_: TriggerRequest, reply: Reply<TriggerResponse>| drop(reply);
     let _forgets = (two

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use lattice_msgs::std_msgs::String as RosString;
-use lattice_runtime::Load;
+use lattice_runtime::SubscriptionExecutor;
 use lattice_runtime::qos::Qos;
 use lattice_test::domain::TestDomain;
 use lattice_test::python::{python, script};
@@ -37,10 +37,16 @@ fn stop_and_go(start: impl FnOnce(&TestDomain) -> Echo, stop: Duration) {
         .unwrap();
     let (joined, joins) = channel();
     talk.on_subscriber_joined(move || joined.send(()).unwrap());
-    let (said, repeated) = hear::<RosString>(&node, "/said", Qos::reliable(10), Load::Small);
+    let (said, repeated) = hear::<RosString>(
+        &node,
+        "/said",
+        Qos::reliable(10),
+        SubscriptionExecutor::Shared,
+    );
     let (again, back) = channel();
     said.on_publisher_joined(move || again.send(()).unwrap());
-    let (_map, maps) = hear::<RosString>(&node, "/map", Qos::latched(1), Load::Small);
+    let (_map, maps) =
+        hear::<RosString>(&node, "/map", Qos::latched(1), SubscriptionExecutor::Shared);
     let phrase = Arc::new(Mutex::new(String::new()));
     let (spoken, speaker) = (Arc::clone(&phrase), talk.clone());
     let _timer = us.timer(Duration::from_millis(50), move || {

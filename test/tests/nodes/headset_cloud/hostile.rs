@@ -15,7 +15,7 @@ const SPOILT: [(&str, &str, Spoil); 15] = [
     ("mesh_frame", "expected 'headset_origin'", |m| {
         m.header.frame_id = "map".into()
     }),
-    ("mesh_indices", "triangle 1 has vertex 4", |m| {
+    ("mesh_indices", "triangle 1 refers to vertex 4", |m| {
         m.triangles[5] = 4
     }),
     ("mesh_indices", "vertex 4294967295", |m| {
@@ -28,22 +28,28 @@ const SPOILT: [(&str, &str, Spoil); 15] = [
         m.vertices[9] = f32::INFINITY
     }),
     ("mesh_too_far", "vertex 1", |m| m.vertices[4] = 1e9),
-    ("mesh_malformed", "three numbers make a vertex", |m| {
-        m.vertices.truncate(11)
-    }),
-    ("mesh_malformed", "three vertices make a triangle", |m| {
-        m.triangles.truncate(4)
-    }),
+    (
+        "mesh_malformed",
+        "the number of coordinates is not a multiple of 3",
+        |m| m.vertices.truncate(11),
+    ),
+    (
+        "mesh_malformed",
+        "the number of indices is not a multiple of 3",
+        |m| m.triangles.truncate(4),
+    ),
     ("mesh_malformed", "1 labels for 2 triangles", |m| {
         m.classes = vec![1]
     }),
-    ("mesh_malformed", "its pose is none", |m| {
-        m.pose.orientation.w = f64::NAN
-    }),
-    ("mesh_malformed", "not from 1 to 65536", |m| {
+    (
+        "mesh_malformed",
+        "its pose is not finite or its rotation is zero",
+        |m| m.pose.orientation.w = f64::NAN,
+    ),
+    ("mesh_malformed", "is outside 1..=65536", |m| {
         m.chunks = u32::MAX
     }),
-    ("mesh_malformed", "not from 1 to 65536", |m| m.chunks = 0),
+    ("mesh_malformed", "is outside 1..=65536", |m| m.chunks = 0),
     ("mesh_malformed", "not below", |m| m.chunk = 1),
     ("mesh_malformed", "name is too long", |m| {
         m.surface = "x".repeat(1000)

@@ -106,7 +106,7 @@ fn a_forged_keyframe_of_a_time_to_come_is_noticed_within_seconds() {
         while follower.differences() == 0 {
             assert!(seconds < 7, "not noticed");
             seconds += 1;
-            follower.wait_a_second();
+            follower.check_keyframe_timeout();
             insert(&mut mapper, &scatter(seconds, 5, [3.0; 3], 9.0));
             let update = mapper.take_update();
             follower.on_update(&update[0]).unwrap();

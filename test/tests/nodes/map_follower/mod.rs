@@ -229,7 +229,7 @@ fn a_keyframe_of_many_rounds_is_taken_without_asking_for_another() {
     let mut follower = new();
     for (seed, chunk) in (2..).zip(&keyframe) {
         assert_eq!(follower.on_map(chunk).unwrap(), Followed::Applied);
-        assert!(!follower.wait_a_second());
+        assert!(!follower.check_keyframe_timeout());
         for update in grown(&mut mapper, seed) {
             assert_eq!(follower.on_update(&update).unwrap(), Followed::Applied);
         }
@@ -239,7 +239,7 @@ fn a_keyframe_of_many_rounds_is_taken_without_asking_for_another() {
 
 /// Seconds in which nothing more comes, until the follower asks for a keyframe.
 fn seconds_until_asked(follower: &mut MapFollower) -> Option<usize> {
-    (1..100).find(|_| follower.wait_a_second())
+    (1..100).find(|_| follower.check_keyframe_timeout())
 }
 
 #[test]

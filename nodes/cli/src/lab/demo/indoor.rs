@@ -9,7 +9,7 @@ use lattice_lab::datasets::{Indoor, IndoorOptions, label_accuracy, write_indoor}
 use lattice_msgs::calibration::CalibrationResult;
 use lattice_nodes::convert::calibration::verdict_name;
 use lattice_nodes::convert::geometry::isometry_from_transform;
-use lattice_nodes::files::whole::write_text;
+use lattice_nodes::files::atomic_write::write_text;
 use lattice_nodes::headset_cloud::HeadsetReport;
 use lattice_nodes::lattice_mapper::MapperReport;
 use lattice_nodes::report;

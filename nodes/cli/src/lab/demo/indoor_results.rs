@@ -8,7 +8,7 @@ use lattice_msgs::calibration::CalibrationResult;
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Runtime, Shutdown, Subscription};
+use lattice_runtime::{LoopbackDomain, Runtime, Shutdown, Subscription, SubscriptionExecutor};
 
 use crate::CliResult;
 
@@ -43,7 +43,12 @@ impl Results {
             // Nobody listens any more at the end.
             let _ = tell.send(result);
         };
-        let subscription = node.subscribe("calibration", Qos::LATCHED, Load::Small, on_result)?;
+        let subscription = node.subscribe(
+            "calibration",
+            Qos::LATCHED,
+            SubscriptionExecutor::Shared,
+            on_result,
+        )?;
         Ok(Self {
             heard,
             shutdown: runtime.shutdown_handle(),

@@ -17,7 +17,7 @@ use lattice_bag::Storage;
 use lattice_core::lattice::LatticeKind;
 use lattice_lab::datasets::BobcatOptions;
 use lattice_lab::render::RenderOptions;
-use lattice_nodes::files::whole::write_text;
+use lattice_nodes::files::atomic_write::write_text;
 use std::fs::{self, File, TryLockError};
 #[cfg(feature = "viewer")]
 use std::io::IsTerminal;

@@ -13,7 +13,7 @@ use lattice_msgs::lattice::{LatticeInfo, LatticeMap};
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
-use lattice_nodes::viewer_server::{Class, Entry, Gate, Hub, Server};
+use lattice_nodes::viewer_server::{Broadcaster, Class, Entry, RequestAuth, Server};
 use serde::Serialize;
 use serde_bytes::ByteBuf;
 
@@ -48,7 +48,7 @@ impl Known {
 
 /// The server and its channels.
 pub struct Stage {
-    hub: Arc<Hub>,
+    broadcaster: Arc<Broadcaster>,
     calibration: u32,
     free: u32,
     label_info: u32,
@@ -71,22 +71,28 @@ impl Stage {
     }
 
     fn with(cells: &[Known], live: bool) -> Self {
-        let hub = Arc::new(Hub::new(4));
-        hub.channel::<LatticeMap>("/map", Class::Map, false);
+        let broadcaster = Arc::new(Broadcaster::new(4));
+        broadcaster.channel::<LatticeMap>("/map", Class::Map, false);
         let one = Class::Newest { depth: 1 };
-        let calibration = hub.channel::<CalibrationResult>("/calibration", one, true);
-        let free = hub.channel::<LatticeMap>("/free", one, true);
-        let label_info = hub.channel::<LabelInfo>("/label_info", one, true);
-        let transforms = hub.channel::<TFMessage>("/tf", one, true);
-        let states =
-            || hub.channel::<DiagnosticArray>("/diagnostics", Class::Newest { depth: 20 }, false);
+        let calibration = broadcaster.channel::<CalibrationResult>("/calibration", one, true);
+        let free = broadcaster.channel::<LatticeMap>("/free", one, true);
+        let label_info = broadcaster.channel::<LabelInfo>("/label_info", one, true);
+        let transforms = broadcaster.channel::<TFMessage>("/tf", one, true);
+        let states = || {
+            broadcaster.channel::<DiagnosticArray>(
+                "/diagnostics",
+                Class::Newest { depth: 20 },
+                false,
+            )
+        };
         let diagnostics = live.then(states);
         let chunk = chunk(&map(cells));
-        hub.change_map(|stream| stream.set_keyframe(vec![chunk]));
+        broadcaster.change_map(|stream| stream.set_keyframe(vec![chunk]));
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let server = Server::start(address, Gate::default(), Arc::clone(&hub)).unwrap();
+        let server =
+            Server::start(address, RequestAuth::default(), Arc::clone(&broadcaster)).unwrap();
         Self {
-            hub,
+            broadcaster,
             calibration,
             free,
             label_info,
@@ -101,7 +107,7 @@ impl Stage {
     pub fn replace(&self, cells: &[Known]) {
         let mut map = map(cells);
         map.info.epoch += 1;
-        self.hub.change_map(|stream| {
+        self.broadcaster.change_map(|stream| {
             stream.reset();
             stream.set_keyframe(vec![chunk(&map)]);
         });
@@ -119,7 +125,7 @@ impl Stage {
         let message = TFMessage {
             transforms: vec![transform],
         };
-        self.hub
+        self.broadcaster
             .offer(self.transforms, cdr::to_vec(&message).unwrap());
     }
 
@@ -141,12 +147,14 @@ impl Stage {
             ..DiagnosticArray::default()
         };
         let channel = self.diagnostics.unwrap();
-        self.hub.offer(channel, cdr::to_vec(&states).unwrap());
+        self.broadcaster
+            .offer(channel, cdr::to_vec(&states).unwrap());
     }
 
     /// Tells of free cells.
     pub fn frees(&self, cells: &[Known]) {
-        self.hub.offer(self.free, cdr::to_vec(&map(cells)).unwrap());
+        self.broadcaster
+            .offer(self.free, cdr::to_vec(&map(cells)).unwrap());
     }
 
     /// Tells the names of labels.
@@ -159,12 +167,13 @@ impl Stage {
             class_map: classes.iter().map(class).collect(),
             ..LabelInfo::default()
         };
-        self.hub.offer(self.label_info, cdr::to_vec(&info).unwrap());
+        self.broadcaster
+            .offer(self.label_info, cdr::to_vec(&info).unwrap());
     }
 
     /// Tells of a calibration.
     pub fn calibrated(&self, result: &CalibrationResult) {
-        self.hub
+        self.broadcaster
             .offer(self.calibration, cdr::to_vec(result).unwrap());
     }
 }

@@ -117,7 +117,7 @@ fn places() -> Vec<Case> {
         ]),
         mcap("poses_elsewhere").says(&[
             "/odom: position jumped by 28.",
-            "and stayed there: the map goes on there",
+            "and stayed there: the map continues there",
         ]),
         sqlite3("mount_without_rotation").refused(&[
             "transform of 'lidar' in 'base_link' is not finite, or its quaternion is zero",

@@ -16,7 +16,7 @@ use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Load, LoopbackDomain, Runtime};
+use lattice_runtime::{LoopbackDomain, Runtime, SubscriptionExecutor};
 use tempfile::TempDir;
 use wait_timeout::ChildExt;
 
@@ -120,7 +120,9 @@ impl Place {
             let _ = told.send(names.collect());
         };
         let of = ("/diagnostics", Qos::DIAGNOSTICS);
-        let subscription = node.subscribe(of.0, of.1, Load::Small, handler).unwrap();
+        let subscription = node
+            .subscribe(of.0, of.1, SubscriptionExecutor::Shared, handler)
+            .unwrap();
         Listener {
             nodes,
             _subscription: subscription,

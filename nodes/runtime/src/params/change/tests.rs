@@ -158,7 +158,7 @@ fn nothing_is_set_before_the_node_is_ready_nor_against_the_second_who_is_asked()
     assert!(
         set(&params, &[("count", "4")])
             .unwrap_err()
-            .contains("not at work")
+            .contains("not running")
     );
     params.also_apply(|_| Err("the clock stands".to_owned()));
     params.open(|_| Ok(()));

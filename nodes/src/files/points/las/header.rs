@@ -1,20 +1,20 @@
-//! The header of a LAS file and its variable length records.
+//! Header of a LAS file and its variable length records.
 
 use super::reference;
 use crate::files::points::scalar::Scalar;
 use crate::files::points::source::Source;
 use crate::files::points::{PointFileError, PointFormat};
 
-/// Bytes of the shortest header, that of version 1.0.
+/// Length of the shortest header, that of version 1.0, bytes.
 const MIN_HEADER: u16 = 227;
-/// Bytes of the longest header that is taken.
+/// Length of the longest accepted header, bytes.
 const MAX_HEADER: u16 = 4096;
-/// Bytes of a record's own header.
+/// Length of a record's own header, bytes.
 const RECORD_HEADER: u64 = 54;
-/// Bits of the point format that say that points are packed.
+/// Bits of the point format that mark compressed points.
 const PACKED: u8 = 0b1100_0000;
 
-/// Places of the fields, bytes.
+/// Offsets of the fields, bytes.
 const VERSION: usize = 24;
 const HEADER_BYTES: usize = 94;
 const POINTS_AT: usize = 96;
@@ -26,7 +26,7 @@ const SCALE: usize = 131;
 const OFFSET: usize = 155;
 const POINTS: usize = 247;
 
-/// Fields of a header that reading takes.
+/// Header fields needed for reading.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Header {
     pub(super) points: u64,
@@ -35,12 +35,12 @@ pub(super) struct Header {
     pub(super) is_packed: bool,
     pub(super) scale: [f64; 3],
     pub(super) offset_m: [f64; 3],
-    /// Compression of the points, from the record of LASzip.
+    /// Compression parameters of the points, from the LASzip record.
     pub(super) laszip: Option<Vec<u8>>,
 }
 
 impl Header {
-    /// Reads up to the first point. Fails if the records say that coordinates are not metres.
+    /// Reads up to the first point. Fails if the records state other units than metres.
     pub(super) fn read(source: &mut Source) -> Result<Header, PointFileError> {
         let mut bytes = vec![0; usize::from(MIN_HEADER)];
         source.exact(&mut bytes, "the header")?;
@@ -83,7 +83,7 @@ impl Header {
         header.read_records(source, records, points_at)
     }
 
-    /// The same with what its records say; the source is at the first point then.
+    /// Reads the records and leaves the source at the first point.
     fn read_records(
         mut self,
         source: &mut Source,
@@ -118,7 +118,7 @@ impl Header {
             }
         }
         let behind = points_at.checked_sub(source.byte()).ok_or_else(|| {
-            let reason = format!("points at byte {points_at}, which is in the header");
+            let reason = format!("points at byte {points_at}, which is inside the header");
             fault(source, reason)
         })?;
         source.skip(behind, "what precedes the points")?;
@@ -157,7 +157,7 @@ impl Header {
     }
 }
 
-/// The number of points: in 64 bits since version 1.4.
+/// Number of points: in 64 bits since version 1.4.
 fn points(header: &[u8]) -> u64 {
     let old = header
         .get(OLD_POINTS..)
@@ -166,7 +166,7 @@ fn points(header: &[u8]) -> u64 {
     let is_new = header.get(VERSION..VERSION + 2) >= Some(&[1, 4]);
     let new = header.get(POINTS..).and_then(|bytes| bytes.first_chunk());
     let new = new.map_or(0, |bytes| u64::from_le_bytes(*bytes));
-    // Some writers leave the new one empty.
+    // Some writers leave the new field empty.
     if is_new && new > 0 { new } else { old }
 }
 

@@ -1,4 +1,4 @@
-//! Points that LASzip has packed.
+//! LASzip-compressed points.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -12,7 +12,7 @@ use super::header::Header;
 use crate::files::points::collect::Collector;
 use crate::files::points::{PointFileError, PointFormat};
 
-/// Reads the points of a file, which begin at a byte of it.
+/// Reads the points of a file from a byte offset.
 pub(super) fn read(
     path: &Path,
     points_at: u64,
@@ -25,8 +25,8 @@ pub(super) fn read(
         reason,
     };
     let record = header.laszip.as_deref();
-    let record = record.ok_or_else(|| fault("no record of LASzip, which says how".to_owned()))?;
-    // Of its own accord the crate checks nothing that a damaged file may have wrong.
+    let record = record.ok_or_else(|| fault("the LASzip record is missing".to_owned()))?;
+    // The crate does not validate damaged files.
     let unpacked = catch_unwind(AssertUnwindSafe(|| {
         let mut packed = Packed::open(path, points_at, record).map_err(&fault)?;
         let mut bytes = vec![0; usize::from(header.point_bytes)];
@@ -48,7 +48,7 @@ pub(super) fn read(
     unpacked.unwrap_or_else(|_| Err(fault("the packed points are damaged".to_owned())))
 }
 
-/// The packed points of a file.
+/// Compressed points of a file.
 struct Packed {
     file: BufReader<File>,
     length: u64,
@@ -70,7 +70,7 @@ impl Packed {
         })
     }
 
-    /// Refuses sizes that nothing in the file bears out, before memory is taken for them.
+    /// Rejects sizes inconsistent with the file before allocating memory.
     fn check(&mut self, header: &Header) -> Result<(), String> {
         let items = self.about.items().iter().map(|item| u32::from(item.size()));
         let (items, point) = (items.sum::<u32>(), u32::from(header.point_bytes));
@@ -92,12 +92,12 @@ impl Packed {
         Ok(())
     }
 
-    /// A table of chunks has a byte or more for each of them.
+    /// Checks the chunk table, which has at least one byte per chunk.
     fn check_table(&mut self) -> io::Result<()> {
         self.file.seek(SeekFrom::Start(self.points_at))?;
         let mut table_at = self.number::<8>().map(u64::from_le_bytes)?;
         if !(self.points_at + 1..self.length).contains(&table_at) {
-            // Writers that cannot go back have it at the end.
+            // Streaming writers append it at the end.
             self.file.seek(SeekFrom::End(-8))?;
             table_at = self.number::<8>().map(u64::from_le_bytes)?;
         }
@@ -113,7 +113,7 @@ impl Packed {
         }
     }
 
-    /// Each chunk of a layered file begins with a point, the number of points and the bytes of each layer.
+    /// Checks the chunks of a layered file: each begins with a point, the number of points and the bytes of each layer.
     fn check_layers(&mut self, header: &Header) -> io::Result<()> {
         let layers = self
             .about
@@ -154,7 +154,7 @@ impl Packed {
         Ok(bytes)
     }
 
-    /// A decoder of places and classes.
+    /// Decoder of coordinates and classes.
     fn decoder(mut self) -> Result<LasZipDecompressor<'static, BufReader<File>>, String> {
         let begin = SeekFrom::Start(self.points_at);
         self.file.seek(begin).map_err(|error| error.to_string())?;

@@ -1,4 +1,4 @@
-//! LAS files of the ASPRS, versions 1.0 to 1.4, and LAZ, as LASzip packs them.
+//! LAS files of the ASPRS, versions 1.0 to 1.4, and LAZ, their LASzip-compressed form.
 
 mod header;
 #[cfg(feature = "survey")]
@@ -18,7 +18,7 @@ use header::Header;
 /// First bytes of every file.
 pub(super) const SIGNATURE: &[u8] = b"LASF";
 
-/// Reads the points, with their classification as labels; `file` is what the source reads, if it is not packed.
+/// Reads the points, with their classification as labels; `file` is the uncompressed input, if any.
 pub(super) fn read(
     source: &mut Source,
     file: Option<&Path>,
@@ -67,7 +67,7 @@ fn read_packed(
 }
 
 impl Header {
-    /// Takes the point of a record.
+    /// Adds the point of a record.
     fn push(&self, record: &[u8], points: &mut Collector) -> Result<(), PointFileError> {
         let mut point_m = [f64::NAN; 3];
         let axes = point_m
@@ -78,7 +78,7 @@ impl Header {
             let steps = Scalar::I32.decode(bytes).unwrap_or(f64::NAN);
             *coordinate = steps * scale + offset_m;
         }
-        // Up to format 5 the higher bits are flags; of the classes the first two are none.
+        // Up to format 5 the higher bits are flags; the first two classes count as unlabelled.
         let class = match self.point_format {
             ..=5 => record.get(15).map(|bits| bits & 0x1f),
             _ => record.get(16).copied(),

@@ -1,19 +1,19 @@
-//! The coordinate reference system of a LAS file, as far as it says that coordinates are not metres.
+//! Coordinate reference system of a LAS file, checked for units other than metres.
 
-/// Records of `LASF_Projection`.
+/// Record ids of `LASF_Projection`.
 const WKT: u16 = 2112;
 const GEO_KEYS: u16 = 34735;
 
-/// Keys of GeoTIFF and their values.
+/// GeoTIFF keys and values.
 const MODEL_TYPE: u16 = 1024;
 const GEOGRAPHIC: u16 = 2;
 const LINEAR_UNIT: u16 = 3076;
 const VERTICAL_UNIT: u16 = 4099;
 const METRE: u16 = 9001;
-/// Linear units in GeoTIFF have numbers from 9001 on; 0 and 32767 are undefined and own ones.
+/// GeoTIFF linear units, from 9001 on; 0 is undefined, 32767 user-defined.
 const UNITS: std::ops::Range<u16> = 9001..9100;
 
-/// Refuses a system whose coordinates are degrees or another unit than metres.
+/// Rejects a system whose coordinates are degrees or another unit than metres.
 pub(super) fn check(record: u16, data: &[u8]) -> Result<(), String> {
     match record {
         GEO_KEYS => check_keys(data),
@@ -22,7 +22,7 @@ pub(super) fn check(record: u16, data: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Keys of four numbers: key, place of its value (0: here), count, value. The first four are no key.
+/// Checks keys of four numbers: key, location of its value (0: inline), count, value. The first four are a header.
 fn check_keys(data: &[u8]) -> Result<(), String> {
     let (numbers, _) = data.as_chunks::<2>();
     let numbers: Vec<u16> = numbers.iter().map(|b| u16::from_le_bytes(*b)).collect();
@@ -50,7 +50,7 @@ fn check_text(wkt: &str) -> Result<(), String> {
     if is_geographic.iter().any(|start| wkt.starts_with(start)) {
         return Err(refusal("degrees"));
     }
-    // No name of a unit of length with a foot in it is metres; datums and projections have none.
+    // A length unit whose name contains "foot" is not metres; names of datums and projections never contain it.
     let units = wkt.split("unit[\"").skip(1);
     let mut names = units.filter_map(|rest| rest.split('"').next());
     match names.find(|name| name.contains("foot") || name.contains("feet")) {

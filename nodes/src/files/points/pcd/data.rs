@@ -1,4 +1,4 @@
-//! The points of a PCD file.
+//! Point data of a PCD file.
 
 use super::header::{Axis, Header};
 use super::lzf;
@@ -7,7 +7,7 @@ use crate::files::points::source::Source;
 use crate::files::points::text::number;
 use crate::files::points::{PointFileError, PointFormat};
 
-/// One point a line; empty lines are ignored.
+/// Reads one point per line; empty lines are ignored.
 pub(super) fn read_text(
     source: &mut Source,
     header: &Header,
@@ -49,7 +49,7 @@ pub(super) fn read_text(
     Ok(())
 }
 
-/// Point after point.
+/// Reads points in sequence.
 pub(super) fn read_binary(
     source: &mut Source,
     header: &Header,
@@ -68,7 +68,7 @@ pub(super) fn read_binary(
     Ok(())
 }
 
-/// Two lengths as u32, compressed and not, and one LZF block with field after field.
+/// Reads two lengths as u32, compressed and uncompressed, and one LZF block with the fields in sequence.
 pub(super) fn read_compressed(
     source: &mut Source,
     header: &Header,
@@ -84,7 +84,7 @@ pub(super) fn read_compressed(
         source.exact(length, "the lengths of the compressed data")?;
     }
     let [packed, unpacked] = lengths.map(u32::from_le_bytes);
-    // Both factors are bounded: by the limit on points and by that on the bytes of one.
+    // Both factors are bounded, by the limits of points and of bytes per point.
     let expected = header.points.saturating_mul(header.point_bytes);
     if u64::from(unpacked) != expected {
         let reason = format!(
@@ -100,7 +100,7 @@ pub(super) fn read_compressed(
         .map_err(|lzf::Corrupt { byte, reason }| fault(start + byte as u64, reason))?;
     for index in 0..header.points {
         let value = |axis: Axis| {
-            // All of a field lies together; within the data, which is below 2^32 bytes.
+            // Fields are contiguous; the offset is below 2^32.
             let at = axis.offset * header.points + index * axis.scalar.size() as u64;
             let bytes = data.get(at as usize..).unwrap_or_default();
             axis.scalar.decode(bytes).unwrap_or(f64::NAN)

@@ -1,4 +1,4 @@
-//! The header of a PCD file.
+//! Header of a PCD file.
 
 use super::viewpoint;
 use crate::files::points::label::label_among;
@@ -6,12 +6,12 @@ use crate::files::points::scalar::Scalar;
 use crate::files::points::source::Source;
 use crate::files::points::{PointFileError, PointFormat};
 
-/// Most lines of a header.
+/// Limit of header lines.
 const MAX_LINES: u64 = 1000;
-/// Most bytes of a point.
+/// Limit of bytes per point.
 const MAX_POINT_BYTES: u64 = 1 << 20;
 
-/// Places of x, y and z in the data.
+/// Layout of x, y and z in the data.
 #[derive(Debug)]
 pub(super) struct Header {
     /// One of the PCD formats.
@@ -20,29 +20,29 @@ pub(super) struct Header {
     pub(super) points: u64,
     /// Rows of an organised cloud, else 1.
     pub(super) rows: u64,
-    /// Bytes of a point.
+    /// Bytes per point.
     pub(super) point_bytes: u64,
-    /// Numbers of a point.
+    /// Numbers per point.
     pub(super) columns: u64,
     /// x, y and z.
     pub(super) axes: [Axis; 3],
-    /// The class, if there is a field `label` of one number.
+    /// Class, if there is a scalar field `label`.
     pub(super) label: Option<Axis>,
-    /// Remark on the sensor's pose, if it is another than the origin.
+    /// Warning about a sensor pose other than the identity.
     pub(super) viewpoint: Option<String>,
 }
 
-/// Place of one number.
+/// Position of one number.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Axis {
     pub(super) scalar: Scalar,
-    /// Bytes of a point before it.
+    /// Byte offset in a point.
     pub(super) offset: u64,
-    /// Numbers of a point before it.
+    /// Column in a point.
     pub(super) column: u64,
 }
 
-/// The lines as they stand.
+/// Header lines as read.
 #[derive(Default)]
 struct Lines {
     fields: Vec<String>,
@@ -75,7 +75,7 @@ impl Header {
     }
 }
 
-/// The format is not known before the last line.
+/// Header error; the format is not known before the last line.
 fn fault(line: u64, reason: String) -> PointFileError {
     PointFileError::Line {
         format: PointFormat::PcdAscii,
@@ -85,7 +85,7 @@ fn fault(line: u64, reason: String) -> PointFileError {
 }
 
 impl Lines {
-    /// Keeps a line; gives the format when it is the last one.
+    /// Stores a line; returns the format at the last one.
     fn take(&mut self, line: &str) -> Result<Option<PointFormat>, String> {
         let mut words = line.split_whitespace();
         let keyword = words.next().unwrap_or_default();
@@ -106,13 +106,13 @@ impl Lines {
             ("DATA", ["binary_compressed"]) => return Ok(Some(PointFormat::PcdBinaryCompressed)),
             _ => {
                 let line: String = line.chars().take(60).collect();
-                return Err(format!("{line:?} is no line of a PCD 0.7 header"));
+                return Err(format!("{line:?} is not a line of a PCD 0.7 header"));
             }
         }
         Ok(None)
     }
 
-    /// Header that the lines make together.
+    /// Header from all lines.
     fn header(&self, format: PointFormat) -> Result<Header, String> {
         let fields = self.fields.len();
         let ones = vec![1; fields];

@@ -1,19 +1,19 @@
-//! LZF, a compression without header or checksum.
+//! LZF decompression; the format has no header and no checksum.
 //!
-//! A control byte below 32 is followed by one literal byte more than its value. Otherwise its upper
-//! three bits, plus the next byte if they are 7, plus 2, are the length of a copy; its lower five and
-//! the last byte are how far back before the previous byte it starts.
+//! A control byte c below 32 is followed by c + 1 literal bytes. Otherwise its upper
+//! three bits, plus the next byte if they are 7, plus 2, are the length of a copy. Its lower five bits and
+//! the last byte are the distance of the copy's start before the previous byte.
 
-/// Error in compressed data and its place.
+/// Error in compressed data and its position.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Corrupt {
-    /// Start of the piece that is wrong.
+    /// Start of the invalid item.
     pub(super) byte: usize,
-    /// Problem in words.
+    /// What is wrong.
     pub(super) reason: String,
 }
 
-/// Unpacks data that must give `length` bytes; takes at most some 90 times the memory of `packed`.
+/// Decompresses data of `length` bytes; memory is bounded by about 90 times that of `packed`.
 pub(super) fn unpack(packed: &[u8], length: usize) -> Result<Vec<u8>, Corrupt> {
     let mut data: Vec<u8> = Vec::with_capacity(length.min(packed.len().saturating_mul(4)));
     let mut rest = packed;
@@ -40,7 +40,7 @@ pub(super) fn unpack(packed: &[u8], length: usize) -> Result<Vec<u8>, Corrupt> {
             let start = data.len().checked_sub(back).ok_or_else(|| {
                 corrupt(format!("a copy from {back} bytes back, of {}", data.len()))
             })?;
-            // Source and target may overlap: the copy repeats what it has just written.
+            // Source and target may overlap: the copy then repeats its own output.
             for at in start..start + size {
                 data.extend(data.get(at).copied());
             }

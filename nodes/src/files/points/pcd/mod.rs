@@ -1,4 +1,4 @@
-//! PCD 0.7, the files of the Point Cloud Library: a header of fields, and the points as text, binary
+//! PCD 0.7 of the Point Cloud Library: a header of fields, and the points as text, binary
 //! or LZF-compressed.
 
 mod data;

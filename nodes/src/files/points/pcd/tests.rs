@@ -75,7 +75,7 @@ fn count_and_points_may_be_missing() {
 
 /// Changes of the header, and what the error says.
 const WRONG_HEADERS: &str = r#"
-    VERSION .7 | VERSION 0.5 | 1: "VERSION 0.5" is no line of a PCD 0.7 header
+    VERSION .7 | VERSION 0.5 | 1: "VERSION 0.5" is not a line of a PCD 0.7 header
     SIZE 1     | SIZE -1 | 3: "-1" is not a number without sign
     COUNT 3 1  | COUNT 3 | 10: FIELDS, SIZE, TYPE and COUNT have 5, 5, 5 and 4 entries, which must agree
     z x        | z X | 10: FIELDS are ["_", "z", "X", "normal", "y"], without all of x, y and z
@@ -99,7 +99,7 @@ fn the_truth_about_a_wrong_header_is_told() {
         assert_eq!(found, format!("PCD (ascii) file, line {message}"));
     }
     let zip = with(HEADER, "zip", b"").unwrap_err();
-    assert!(zip.contains("\"DATA zip\" is no line"), "{zip}");
+    assert!(zip.contains("\"DATA zip\" is not a line"), "{zip}");
     let empty = pcd("\n".repeat(2000)).unwrap_err();
     assert!(empty.contains("no DATA in its first 1000 lines"), "{empty}");
 }

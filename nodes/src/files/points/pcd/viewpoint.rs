@@ -1,31 +1,31 @@
-//! The pose of the sensor in the header of a PCD file.
+//! Sensor pose in the header of a PCD file.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// Motion that is of printing, m and rad.
+/// Rounding error of a printed identity, m and rad.
 const STILL: f64 = 1e-6;
 
-/// Remark on `VIEWPOINT tx ty tz qw qx qy qz`, unless it is the origin.
+/// Warning about `VIEWPOINT tx ty tz qw qx qy qz`, unless it is the identity.
 ///
-/// It is not applied: some programs write points of the sensor with it (CloudCompare places them by it), others points that
-/// are placed already (the recorder of perception_pcl), and nothing in the file tells which.
+/// It is not applied. Some programs write points in the sensor's frame with it (CloudCompare applies it), others
+/// write transformed points (the recorder of perception_pcl), and the file does not distinguish the two.
 pub(super) fn remark(words: &[&str]) -> Option<String> {
     let shown: String = words.join(" ").chars().take(100).collect();
     let numbers: Option<Vec<f64>> = words.iter().map(|word| word.parse().ok()).collect();
     let Some(&[x, y, z, qw, qx, qy, qz]) = numbers.as_deref() else {
         return Some(format!(
-            "VIEWPOINT {shown} is no pose of 7 numbers, and ignored"
+            "VIEWPOINT {shown} is not a pose of 7 numbers; ignored"
         ));
     };
     let place_m = Vector3::new(x, y, z);
     let turn = Quaternion::new(qw, qx, qy, qz);
-    // A zero quaternion is what careless writers put for none; one of another length is as good as its direction.
+    // A zero quaternion counts as the identity; others are normalised.
     let turn = UnitQuaternion::try_new(turn, STILL).unwrap_or_default();
     let is_origin = place_m.norm() <= STILL && turn.angle() <= STILL;
     (!is_origin).then(|| {
         format!(
-            "VIEWPOINT {shown} places the sensor away from the origin; it is not applied, and the points are taken as \
-             they stand. If they are in the sensor's frame, transform them before"
+            "VIEWPOINT {shown} places the sensor away from the origin; it is not applied, and the points are used as \
+             given. If they are in the sensor's frame, transform them first"
         )
     })
 }
@@ -68,7 +68,10 @@ mod tests {
             );
         }
         for line in ["", "0 0 0", "0 0 0 1 0 0 0 0", "a b c d e f g"] {
-            assert!(of(line).unwrap().contains("no pose of 7 numbers"), "{line}");
+            assert!(
+                of(line).unwrap().contains("not a pose of 7 numbers"),
+                "{line}"
+            );
         }
     }
 }

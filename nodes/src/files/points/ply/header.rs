@@ -1,27 +1,27 @@
-//! The header of a PLY file.
+//! Header of a PLY file.
 
 use crate::files::points::scalar::Scalar;
 use crate::files::points::source::Source;
 use crate::files::points::{PointFileError, PointFormat};
 
-/// Most lines of a header.
+/// Limit of header lines.
 const MAX_LINES: u64 = 10_000;
 
-/// Form of the data after the header.
+/// Structure of the data after the header.
 #[derive(Debug)]
 pub struct Header {
     /// One of the PLY formats.
     pub format: PointFormat,
-    /// In the order of the data.
+    /// Elements in the order of the data.
     pub elements: Vec<Element>,
-    /// Lines of the header.
+    /// Number of header lines.
     pub lines: u64,
 }
 
-/// Element of a header: so many records of the same properties.
+/// Header element: a number of records with common properties.
 #[derive(Debug)]
 pub struct Element {
-    /// Name, as `vertex`.
+    /// Name, such as `vertex`.
     pub name: String,
     /// Number of records.
     pub count: u64,
@@ -32,16 +32,16 @@ pub struct Element {
 /// Property of an element.
 #[derive(Debug)]
 pub enum Property {
-    /// One number in each record.
+    /// One number per record.
     Scalar {
-        /// Name, as `x`.
+        /// Name, such as `x`.
         name: String,
         /// Type of the number.
         scalar: Scalar,
     },
-    /// A list in each record.
+    /// A list per record.
     List {
-        /// Name, as `vertex_indices`.
+        /// Name, such as `vertex_indices`.
         name: String,
         /// Type of its length.
         count: Scalar,
@@ -51,7 +51,7 @@ pub enum Property {
 }
 
 impl Header {
-    /// Reads up to and with the line `end_header`.
+    /// Reads up to and including the line `end_header`.
     pub fn read(source: &mut Source) -> Result<Header, PointFileError> {
         let mut header = Header {
             format: PointFormat::PlyAscii,
@@ -84,7 +84,7 @@ impl Header {
                     None => Err("a property before the first element".to_owned()),
                 },
                 _ => Err(format!(
-                    "{:?} is no line of a PLY 1.0 header",
+                    "{:?} is not a line of a PLY 1.0 header",
                     shorten(&line)
                 )),
             };

@@ -1,6 +1,7 @@
-//! PLY: a header that names elements and their properties, and the elements, as text or binary.
+//! PLY: a header of elements and properties, and their records, as text or binary.
 //!
-//! Points are the element `vertex`, with a number `label`, or of another usual name, if they have classes. Elements before it are passed over, what follows is not read.
+//! Points are the records of the element `vertex`; a property `label`, or another usual name, is their class.
+//! Elements before it are skipped, those after it are not read.
 
 pub mod header;
 pub mod record;
@@ -61,7 +62,7 @@ pub(super) fn read(
                 format: header.format,
                 byte: source.byte(),
                 reason: format!(
-                    "{label_name} {class} is no whole number from 0 to 65535 or -1, in {part}"
+                    "{label_name} {class} is not an integer in 0..=65535 or -1, in {part}"
                 ),
             })?;
             points.push_labelled(point_m, class)?;
@@ -71,7 +72,7 @@ pub(super) fn read(
     Err(fault("the header has no element vertex".to_owned()))
 }
 
-/// Places of x, y and z among the properties of the vertex.
+/// Indices of x, y and z among the vertex properties.
 pub fn axes(vertex: &Element) -> Result<[usize; 3], String> {
     let find = |axis: &str| {
         let found = number(vertex, axis);
@@ -80,13 +81,13 @@ pub fn axes(vertex: &Element) -> Result<[usize; 3], String> {
     Ok([find("x")?, find("y")?, find("z")?])
 }
 
-/// Place of the number of a name among the properties of an element.
+/// Index of a scalar property by its name.
 pub fn number(element: &Element, wanted: &str) -> Option<usize> {
     let is = |p: &Property| matches!(p, Property::Scalar { name, .. } if name == wanted);
     element.properties.iter().position(is)
 }
 
-/// A class number; -1 is none, as 65535.
+/// Class number; -1 and 65535 are unlabelled.
 fn class_of(value: f64) -> Option<u16> {
     if value == -1.0 {
         return Some(UNLABELED);

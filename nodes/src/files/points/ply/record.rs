@@ -1,4 +1,4 @@
-//! The data of one element of a PLY file.
+//! Records of one element of a PLY file.
 
 use std::fmt::Display;
 
@@ -19,7 +19,7 @@ pub fn read(
     read_with_list(source, header, element, None, part, visit)
 }
 
-/// [`read`], where `visit` also gets the items of the list property `list`, one after the other.
+/// Reads as [`read`]; `visit` also gets the items of the list property `list` in sequence.
 pub fn read_with_list(
     source: &mut Source,
     header: &Header,
@@ -34,7 +34,7 @@ pub fn read_with_list(
     }
 }
 
-/// Passes over all records of an element.
+/// Skips all records of an element.
 pub fn skip(source: &mut Source, header: &Header, element: &Element) -> Result<(), PointFileError> {
     let Element {
         name,
@@ -104,7 +104,7 @@ fn read_binary(
     Ok(())
 }
 
-/// One record a line; empty lines are ignored.
+/// Reads one record per line; empty lines are ignored.
 fn read_text(
     source: &mut Source,
     element: &Element,

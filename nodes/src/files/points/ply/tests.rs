@@ -76,7 +76,7 @@ fn text_data_is_read_past_lists_and_other_elements() {
 /// Files of which every `;` is a new line, and what their error says.
 const WRONG_HEADERS: &str = r#"
     plx;                             | line 1: not a PLY file, which starts with "ply"
-    ply;format ascii 2.0;            | line 2: "format ascii 2.0" is no line of a PLY 1.0 header
+    ply;format ascii 2.0;            | line 2: "format ascii 2.0" is not a line of a PLY 1.0 header
     ply;format base64 1.0;           | line 2: unknown format "base64"
     ply;end_header;                  | line 2: no line gives the format
     ply;property int x;              | line 2: a property before the first element
@@ -170,6 +170,6 @@ fn labels_come_back_and_wrong_ones_are_refused() {
     for wrong in ["-2", "65536", "0.5", "nan"] {
         let fault = read("float", &format!("0 0 1 1\n0 0 1 {wrong}\n0 0 1 1\n")).unwrap_err();
         let place = fault.contains("vertex 2 of 3");
-        assert!(place && fault.contains("no whole number"), "{fault}");
+        assert!(place && fault.contains("not an integer"), "{fault}");
     }
 }

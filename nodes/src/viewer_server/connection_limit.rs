@@ -1,4 +1,4 @@
-//! Room for connections that are no client yet: bounded in all, and for each address.
+//! Limit of connections that are not clients yet: in total, and per address.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, VecDeque};
@@ -9,18 +9,18 @@ use std::rc::Rc;
 use smol::channel::{Receiver, Sender, bounded};
 use smol::future::or;
 
-/// Most connections in a room.
+/// Limit of connections.
 pub const MAX_CONNECTIONS: usize = 64;
-/// Most of them from one address: two pages, each with the six connections that browsers open, and a few more.
+/// Limit per address: two pages, each with the six connections that browsers open, and a few more.
 pub const MAX_PER_ADDRESS: usize = 16;
 
-/// A room. Who comes when it is full takes the place of the oldest connection of the address that has most.
+/// Set of connections. Above a limit a new connection displaces the oldest of the address with the most.
 #[derive(Default)]
-pub struct Room(RefCell<Places>);
+pub struct ConnectionLimit(RefCell<Places>);
 
 #[derive(Default)]
 struct Places {
-    /// In the order in which they came.
+    /// Connections in the order of arrival.
     taken: VecDeque<Place>,
     next: u64,
     displaced: u64,
@@ -29,20 +29,20 @@ struct Places {
 struct Place {
     id: u64,
     address: IpAddr,
-    /// Ends the connection once it is dropped.
+    /// Dropping it ends the connection.
     _keep: Sender<()>,
 }
 
-/// A connection in a room, which it leaves when dropped.
-pub struct Guest {
-    room: Rc<Room>,
+/// A connection in the set; dropping it removes it.
+pub struct ConnectionSlot {
+    limit: Rc<ConnectionLimit>,
     id: u64,
     displaced: Receiver<()>,
 }
 
-impl Room {
-    /// Takes a place, of another one where there is none.
-    pub fn enter(self: &Rc<Self>, from: IpAddr) -> Guest {
+impl ConnectionLimit {
+    /// Adds a connection, displacing another one if needed.
+    pub fn enter(self: &Rc<Self>, from: IpAddr) -> ConnectionSlot {
         let mut places = self.0.borrow_mut();
         let address = network(from);
         let mut counts = BTreeMap::<IpAddr, usize>::new();
@@ -69,22 +69,22 @@ impl Room {
             address,
             _keep: keep,
         });
-        let room = Rc::clone(self);
-        Guest {
-            room,
+        let limit = Rc::clone(self);
+        ConnectionSlot {
+            limit,
             id,
             displaced,
         }
     }
 
-    /// Connections that gave way to newer ones since the last call.
+    /// Connections displaced since the last call.
     pub fn take_displaced(&self) -> u64 {
         std::mem::take(&mut self.0.borrow_mut().displaced)
     }
 }
 
-impl Guest {
-    /// Does the work while the connection has its place.
+impl ConnectionSlot {
+    /// Runs the work until the connection is displaced.
     pub async fn served<T>(&self, work: impl Future<Output = io::Result<T>>) -> io::Result<T> {
         let displaced = async {
             let _ = self.displaced.recv().await;
@@ -94,14 +94,14 @@ impl Guest {
     }
 }
 
-impl Drop for Guest {
+impl Drop for ConnectionSlot {
     fn drop(&mut self) {
-        let taken = &mut self.room.0.borrow_mut().taken;
+        let taken = &mut self.limit.0.borrow_mut().taken;
         taken.retain(|place| place.id != self.id);
     }
 }
 
-/// An IPv4 address, or the first half of an IPv6 address, of which a host has as many as it likes.
+/// IPv4 address, or the /64 prefix of an IPv6 address, within which a host has many addresses.
 fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V4(address) => address.into(),
@@ -113,20 +113,20 @@ fn network(address: IpAddr) -> IpAddr {
 mod tests {
     use super::*;
 
-    fn is_displaced(guest: &Guest) -> bool {
+    fn is_displaced(guest: &ConnectionSlot) -> bool {
         guest.displaced.is_closed()
     }
 
     #[test]
     fn the_oldest_of_an_address_that_has_too_many_gives_way() {
-        let room = Rc::new(Room::default());
-        let from = |last: u8| room.enter(IpAddr::from([10, 0, 0, last]));
+        let limit = Rc::new(ConnectionLimit::default());
+        let from = |last: u8| limit.enter(IpAddr::from([10, 0, 0, last]));
         let (quiet, many) = (from(1), [(); MAX_PER_ADDRESS].map(|()| from(2)));
         assert!(!many.iter().any(is_displaced));
         let _more = [from(2), from(2)];
         assert_eq!(many.iter().filter(|guest| is_displaced(guest)).count(), 2);
         assert!(is_displaced(&many[0]) && is_displaced(&many[1]) && !is_displaced(&quiet));
-        assert_eq!((room.take_displaced(), room.take_displaced()), (2, 0));
+        assert_eq!((limit.take_displaced(), limit.take_displaced()), (2, 0));
         drop(many);
         // Those who have left are no burden.
         let again = [(); MAX_PER_ADDRESS - 2].map(|()| from(2));
@@ -135,10 +135,10 @@ mod tests {
 
     #[test]
     fn in_a_full_room_the_address_with_most_gives_way() {
-        let room = Rc::new(Room::default());
-        let from = |last: u8| room.enter(IpAddr::from([10, 0, 0, last]));
+        let limit = Rc::new(ConnectionLimit::default());
+        let from = |last: u8| limit.enter(IpAddr::from([10, 0, 0, last]));
         let greedy = [(); MAX_PER_ADDRESS].map(|()| from(0));
-        let single: Vec<Guest> = (1..=48).map(from).collect();
+        let single: Vec<ConnectionSlot> = (1..=48).map(from).collect();
         assert_eq!(single.len() + greedy.len(), MAX_CONNECTIONS);
         let last = from(200);
         assert!(is_displaced(&greedy[0]) && !is_displaced(&greedy[1]));
@@ -147,10 +147,10 @@ mod tests {
 
     #[test]
     fn a_host_has_one_room_for_all_its_addresses() {
-        let room = Rc::new(Room::default());
-        let first = room.enter("2001:db8::1".parse().unwrap());
-        let many: Vec<Guest> = (2..18_u16)
-            .map(|last| room.enter(format!("2001:db8::{last}").parse().unwrap()))
+        let limit = Rc::new(ConnectionLimit::default());
+        let first = limit.enter("2001:db8::1".parse().unwrap());
+        let many: Vec<ConnectionSlot> = (2..18_u16)
+            .map(|last| limit.enter(format!("2001:db8::{last}").parse().unwrap()))
             .collect();
         assert!(is_displaced(&first) && !many.iter().any(is_displaced));
         let mapped: IpAddr = "::ffff:10.0.0.1".parse().unwrap();

@@ -1,5 +1,5 @@
-//! Participants that security keeps out. Cyclone says nothing of those without a certificate, nor of all
-//! whose handshake fails; what they have in common is that they show none of their endpoints.
+//! Participants rejected by DDS Security. Cyclone reports neither participants without a certificate nor all
+//! failed handshakes, so rejection is inferred: a rejected participant announces no endpoint.
 
 use std::collections::BTreeMap;
 use std::ffi::{CStr, c_void};
@@ -19,20 +19,20 @@ use super::log::tell;
 use crate::port::EndpointId;
 use crate::sync::lock;
 
-/// Time for the handshake, after which who shows nothing is a stranger.
+/// Time for the handshake. A participant without endpoints after it counts as unauthenticated.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Participants that are watched, at most.
+/// Limit of tracked participants.
 const MAX_PARTICIPANTS: usize = 4096;
 
-/// Property in which Cyclone gives the addresses of a participant.
+/// Cyclone property with the addresses of a participant.
 const ADDRESSES: &CStr = c"__NetworkAddresses";
 
-/// First twelve bytes of the GUIDs of a participant and its endpoints.
+/// GUID prefix (12 bytes), common to a participant and its endpoints.
 type Prefix = [u8; 12];
 
-/// Watches who comes, and who shows endpoints.
-pub(super) struct Strangers {
+/// Tracks discovered participants and whether each has announced an endpoint.
+pub(super) struct UnauthenticatedParticipants {
     participants: Entity,
     ours: Option<Prefix>,
     others: Mutex<BTreeMap<Prefix, Other>>,
@@ -40,11 +40,11 @@ pub(super) struct Strangers {
 
 struct Other {
     since: Instant,
-    shows_itself: bool,
+    authenticated: bool,
     addresses: String,
 }
 
-impl Strangers {
+impl UnauthenticatedParticipants {
     pub(super) fn watch(participant: &Entity) -> Result<Self, String> {
         let (parent, topic) = (participant.handle(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT);
         // SAFETY: handles; no QoS and no listener.
@@ -56,20 +56,20 @@ impl Strangers {
         })
     }
 
-    /// An endpoint of a participant is known, so security has let the participant in.
-    pub(super) fn shows_itself(&self, endpoint: EndpointId) {
+    /// Marks the participant of a discovered endpoint as authenticated.
+    pub(super) fn mark_authenticated(&self, endpoint: EndpointId) {
         if let Some(prefix) = prefix(endpoint) {
             note(&mut lock(&self.others), prefix, |other| {
-                other.shows_itself = true
+                other.authenticated = true
             });
         }
     }
 
-    /// Participants that are kept out; the log names them.
+    /// Number of unauthenticated participants; logs each.
     pub(super) fn count(&self) -> usize {
         let mut others = lock(&self.others);
         take_all(self.participants.handle(), &mut |sample, alive| {
-            // SAFETY: the reader is of participants; this one is lent during the call.
+            // SAFETY: this reader returns participants; each is valid during the call.
             let (id, addresses) = unsafe {
                 let participant = sample.cast::<dds_builtintopic_participant_t>();
                 let Some(participant) = participant.as_ref() else {
@@ -85,10 +85,11 @@ impl Strangers {
                 None => {}
             }
         });
-        let out = |other: &&Other| !other.shows_itself && other.since.elapsed() >= PATIENCE;
+        let out = |other: &&Other| !other.authenticated && other.since.elapsed() >= PATIENCE;
         let out = others.values().filter(out);
         out.inspect(|other| {
-            let words = "is kept out: it has no certificate or no permissions that hold here";
+            let words =
+                "is not authenticated: it has no certificate, or no permissions for this domain";
             tell(
                 Level::Warn,
                 &format!("the participant at {} {words}", other.addresses),
@@ -102,7 +103,7 @@ fn note(others: &mut BTreeMap<Prefix, Other>, prefix: Prefix, change: impl FnOnc
     if others.len() < MAX_PARTICIPANTS || others.contains_key(&prefix) {
         change(others.entry(prefix).or_insert_with(|| Other {
             since: Instant::now(),
-            shows_itself: false,
+            authenticated: false,
             addresses: String::new(),
         }));
     }
@@ -114,11 +115,11 @@ fn prefix(id: EndpointId) -> Option<Prefix> {
 
 /// # Safety
 ///
-/// The participant is one that Cyclone has lent.
+/// The participant is on loan from Cyclone.
 unsafe fn addresses(participant: &dds_builtintopic_participant_t) -> String {
     let mut text = ptr::null_mut();
-    // SAFETY: the QoS is null or lives as long as the participant; the text is a copy that ends with 0, is
-    // ours, and is freed once.
+    // SAFETY: the QoS is null or lives as long as the participant; the text is an owned NUL-terminated copy,
+    // freed once.
     unsafe {
         if participant.qos.is_null()
             || !dds_qget_prop(participant.qos, ADDRESSES.as_ptr(), &mut text)

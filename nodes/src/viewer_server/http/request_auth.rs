@@ -1,4 +1,4 @@
-//! Decision about a request: a file of the page, a WebSocket, or a refusal.
+//! Authorization of a request: a file of the page, a WebSocket, or a rejection.
 
 use std::net::IpAddr;
 
@@ -8,61 +8,61 @@ use super::files;
 use super::head::Head;
 use crate::viewer_server::protocol::SUBPROTOCOLS;
 
-/// Cookie that holds the token once it has been given in an address.
+/// Cookie with the token after it was given in a URL.
 const COOKIE: &str = "lattice_token";
 
-/// Policy of the page: it loads its own files and nothing else.
+/// Content security policy: the page loads its own files only.
 const POLICY: &str = "default-src 'none'; script-src 'self'; worker-src 'self'; style-src 'self'; \
      connect-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; \
      frame-ancestors 'none'";
 
-/// Conditions on which a request is let in.
+/// Conditions for accepting a request.
 #[derive(Clone, Debug, Default)]
-pub struct Gate {
-    /// Names by which this machine may be called, besides `localhost` and addresses.
+pub struct RequestAuth {
+    /// Host names of this machine, besides `localhost` and addresses.
     pub hosts: Vec<String>,
-    /// Origins of pages from elsewhere that may connect, such as `https://viewer.example`.
+    /// Allowed cross-origin pages, such as `https://viewer.example`.
     pub origins: Vec<String>,
-    /// Secret that a request must know.
+    /// Required secret.
     pub token: Option<String>,
 }
 
-/// An answer that ends the connection.
+/// Response that ends the connection.
 #[derive(Debug, PartialEq)]
 pub struct Response {
-    /// Code and reason.
+    /// Status code and reason.
     pub status: &'static str,
     /// Media type of the body.
     pub media_type: &'static str,
-    /// Further header lines, each with its end.
+    /// Further header lines, each with its line end.
     pub headers: String,
     /// Body.
     pub body: &'static [u8],
 }
 
-/// Outcome of a request.
+/// Decision on a request.
 #[derive(Debug, PartialEq)]
 pub enum Decision {
-    /// An answer.
+    /// Send a response.
     Answer(Response),
-    /// A WebSocket, after these bytes.
+    /// Upgrade to a WebSocket, after sending this head.
     Upgrade(String),
 }
 
-impl Gate {
-    /// Decides about a request.
+impl RequestAuth {
+    /// Decides on a request.
     pub fn decide(&self, head: &Head) -> Decision {
         let Some(host) = head.host.as_deref().filter(|host| self.knows(host)) else {
-            let why = b"This host name is not served here: add it to `allowed_hosts`.\n";
+            let why = b"This host name is not allowed: add it to `allowed_hosts`.\n";
             return refuse("421 Misdirected Request", why);
         };
         if head.method != "GET" {
-            return refuse("405 Method Not Allowed", b"Only GET is answered.\n");
+            return refuse("405 Method Not Allowed", b"Only GET is supported.\n");
         }
         if let Some(origin) = &head.origin
             && !self.trusts(origin, host)
         {
-            let why = b"This origin may not connect: add it to `allowed_origins`.\n";
+            let why = b"This origin is not allowed: add it to `allowed_origins`.\n";
             return refuse("403 Forbidden", why);
         }
         if let Some(token) = &self.token {
@@ -88,8 +88,8 @@ impl Gate {
         }
     }
 
-    /// True for the names of this machine. A name of somebody else's may be made to lead here; an
-    /// address may not.
+    /// True for host names of this machine, against DNS rebinding. A foreign name may resolve to this
+    /// machine; an address cannot.
     fn knows(&self, host: &str) -> bool {
         let name = host.rsplit_once(':').map_or(host, |(name, port)| {
             match port.bytes().all(|byte| byte.is_ascii_digit()) {
@@ -113,7 +113,7 @@ impl Gate {
     }
 }
 
-/// Compares in a time that does not depend on where the texts differ.
+/// Compares in constant time.
 fn same(given: &str, token: &str) -> bool {
     let pairs = given.bytes().zip(token.bytes());
     let differences = pairs.fold(0, |all, (a, b)| all | (a ^ b));
@@ -129,7 +129,7 @@ fn refuse(status: &'static str, body: &'static [u8]) -> Decision {
     })
 }
 
-/// Puts the token into a cookie, and takes it from the address bar.
+/// Stores the token in a cookie, and removes it from the URL.
 fn keep_token(token: &str) -> Decision {
     Decision::Answer(Response {
         status: "303 See Other",
@@ -143,12 +143,12 @@ fn keep_token(token: &str) -> Decision {
 
 fn upgrade(head: &Head) -> Decision {
     let Some(key) = head.key.as_deref().filter(|key| key.len() == 24) else {
-        return refuse("400 Bad Request", b"There is no Sec-WebSocket-Key.\n");
+        return refuse("400 Bad Request", b"Sec-WebSocket-Key is missing.\n");
     };
     if head.version.as_deref() != Some("13") {
         return refuse(
             "426 Upgrade Required",
-            b"Only version 13 of WebSocket is spoken.\n",
+            b"Only WebSocket version 13 is supported.\n",
         );
     }
     let offered = |name: &&&str| head.protocols.iter().any(|offered| offered == **name);
@@ -164,27 +164,27 @@ fn upgrade(head: &Head) -> Decision {
 }
 
 impl Response {
-    /// The answer that there are too many clients.
+    /// Response at the client limit.
     pub fn full() -> Self {
         Self {
             status: "503 Service Unavailable",
             media_type: "text/plain; charset=utf-8",
             headers: "Retry-After: 5\r\n".to_owned(),
-            body: b"All places are taken: close another page, or raise `max_clients`.\n",
+            body: b"`max_clients` is reached: close another page, or raise it.\n",
         }
     }
 
-    /// The answer to what is no request.
+    /// Response to a malformed request.
     pub fn bad_request() -> Self {
         Self {
             status: "400 Bad Request",
             media_type: "text/plain; charset=utf-8",
             headers: String::new(),
-            body: b"This is no request of HTTP/1.1 with a head of at most 8 kB.\n",
+            body: b"Not an HTTP/1.1 request with a head of at most 8 kB.\n",
         }
     }
 
-    /// The bytes to send.
+    /// Serialized response.
     pub fn bytes(&self) -> Vec<u8> {
         let mut bytes = format!(
             "HTTP/1.1 {}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n\
@@ -210,8 +210,8 @@ mod tests {
         Head::parse(text.as_bytes()).unwrap().unwrap().0
     }
 
-    fn status(gate: &Gate, lines: &str) -> String {
-        match gate.decide(&request(lines)) {
+    fn status(auth: &RequestAuth, lines: &str) -> String {
+        match auth.decide(&request(lines)) {
             Decision::Answer(answer) => answer.status.split(' ').next().unwrap().to_owned(),
             Decision::Upgrade(bytes) => bytes.split(' ').nth(1).unwrap().to_owned(),
         }
@@ -222,9 +222,9 @@ mod tests {
 
     #[test]
     fn files_are_served_to_names_of_this_machine() {
-        let gate = Gate {
+        let auth = RequestAuth {
             hosts: vec!["robot.local".to_owned()],
-            ..Gate::default()
+            ..RequestAuth::default()
         };
         for host in [
             "127.0.0.1:8765",
@@ -234,51 +234,51 @@ mod tests {
             "Robot.local:80",
         ] {
             assert_eq!(
-                status(&gate, &format!("GET / HTTP/1.1\nHost: {host}")),
+                status(&auth, &format!("GET / HTTP/1.1\nHost: {host}")),
                 "200",
                 "{host}"
             );
         }
         for host in ["evil.example:8765", "localhost.evil.example", ""] {
             assert_eq!(
-                status(&gate, &format!("GET / HTTP/1.1\nHost: {host}")),
+                status(&auth, &format!("GET / HTTP/1.1\nHost: {host}")),
                 "421",
                 "{host}"
             );
         }
-        assert_eq!(status(&gate, "GET / HTTP/1.1"), "421");
+        assert_eq!(status(&auth, "GET / HTTP/1.1"), "421");
         assert_eq!(
-            status(&gate, "GET /etc/passwd HTTP/1.1\nHost: localhost"),
+            status(&auth, "GET /etc/passwd HTTP/1.1\nHost: localhost"),
             "404"
         );
-        assert_eq!(status(&gate, "POST / HTTP/1.1\nHost: localhost"), "405");
+        assert_eq!(status(&auth, "POST / HTTP/1.1\nHost: localhost"), "405");
     }
 
     #[test]
     fn a_socket_needs_its_own_origin_or_one_that_is_allowed() {
-        let mut gate = Gate::default();
-        let ask = |gate: &Gate, origin: &str| {
+        let mut auth = RequestAuth::default();
+        let ask = |auth: &RequestAuth, origin: &str| {
             let host = "Host: 127.0.0.1:8765";
-            status(gate, &format!("GET / HTTP/1.1\n{host}\n{origin}{SOCKET}"))
+            status(auth, &format!("GET / HTTP/1.1\n{host}\n{origin}{SOCKET}"))
         };
-        assert_eq!(ask(&gate, ""), "101", "no browser");
-        assert_eq!(ask(&gate, "Origin: http://127.0.0.1:8765\n"), "101");
+        assert_eq!(ask(&auth, ""), "101", "no browser");
+        assert_eq!(ask(&auth, "Origin: http://127.0.0.1:8765\n"), "101");
         for other in [
             "http://127.0.0.1:80",
             "https://viewer.example",
             "null",
             "http://localhost:8765",
         ] {
-            assert_eq!(ask(&gate, &format!("Origin: {other}\n")), "403", "{other}");
+            assert_eq!(ask(&auth, &format!("Origin: {other}\n")), "403", "{other}");
         }
-        gate.origins.push("https://viewer.example".to_owned());
-        assert_eq!(ask(&gate, "Origin: https://viewer.example\n"), "101");
+        auth.origins.push("https://viewer.example".to_owned());
+        assert_eq!(ask(&auth, "Origin: https://viewer.example\n"), "101");
     }
 
     #[test]
     fn the_accepted_key_is_that_of_the_standard() {
         let head = request(&format!("GET / HTTP/1.1\nHost: localhost\n{SOCKET}"));
-        let Decision::Upgrade(bytes) = Gate::default().decide(&head) else {
+        let Decision::Upgrade(bytes) = RequestAuth::default().decide(&head) else {
             panic!("no upgrade");
         };
         // The example of RFC 6455, section 1.3.
@@ -288,11 +288,11 @@ mod tests {
 
     #[test]
     fn a_token_comes_by_address_once_and_then_by_cookie() {
-        let gate = Gate {
+        let auth = RequestAuth {
             token: Some("secret".to_owned()),
-            ..Gate::default()
+            ..RequestAuth::default()
         };
-        let ask = |lines: &str| status(&gate, &format!("{lines}\nHost: 10.0.0.7"));
+        let ask = |lines: &str| status(&auth, &format!("{lines}\nHost: 10.0.0.7"));
         assert_eq!(ask("GET / HTTP/1.1"), "401");
         assert_eq!(ask("GET /?token=secre HTTP/1.1"), "401");
         assert_eq!(ask("GET /?token=secret HTTP/1.1"), "303");

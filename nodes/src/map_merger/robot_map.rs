@@ -1,4 +1,4 @@
-//! A robot's share in the merged map.
+//! Map of one robot as part of the merged map.
 
 use std::collections::BTreeMap;
 
@@ -11,10 +11,10 @@ use thiserror::Error;
 
 use crate::map_follower::{FollowedMap, MapFollower};
 
-/// Largest distance of a datum from a lattice point of the merged map, in cell sides.
+/// Tolerance of a datum's distance from a lattice point of the merged map, in cell sizes.
 const DATUM_SLACK: f64 = 1e-6;
 
-/// Reason why a robot's map is no part of the merged one.
+/// Reason why a robot's map is not merged.
 #[derive(Clone, PartialEq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum Refusal {
@@ -29,28 +29,28 @@ pub enum Refusal {
         "its origin is {found:?} (latitude, longitude, height), that of the merged one {expected:?}"
     )]
     Origin { found: [f64; 3], expected: [f64; 3] },
-    /// Cells that lie between those of the merged map.
+    /// Lattice points between those of the merged map.
     #[error("its datum {datum_m:?} m is {off_m} m from the next lattice point of the merged one")]
     Datum { datum_m: [f64; 3], off_m: f64 },
 }
 
-/// A robot's map and its place in the merged one.
-pub struct Share {
+/// Map of one robot and its offset in the merged map.
+pub struct RobotMap {
     pub(super) follower: MapFollower,
-    /// Lattice index of its datum less that of the merged map's; none if it is not part of it.
+    /// Lattice index of its datum minus that of the merged map; `None` if it is not merged.
     shift: Option<[i64; 3]>,
-    /// Epoch that the shift is of.
+    /// Epoch of the shift.
     epoch: Option<u64>,
     refusal: Option<Refusal>,
-    /// Cells of the merged map that it was part of.
+    /// Merged cells that it contributes to.
     cells: FxHashSet<MortonKey>,
-    /// All cells are to be summed up again.
+    /// True if all cells are to be summed again.
     anew: bool,
-    /// Unit of its mean offsets over that of sums.
+    /// Ratio of its offset unit to that of the sums.
     unit: f64,
 }
 
-impl Share {
+impl RobotMap {
     pub(super) fn new(follower: MapFollower) -> Self {
         Self {
             follower: follower.keeping_before(),
@@ -63,12 +63,12 @@ impl Share {
         }
     }
 
-    /// Voxels that it has in the merged map.
+    /// Number of its voxels in the merged map.
     pub fn voxels(&self) -> usize {
         self.cells.len()
     }
 
-    /// Reason why it is no part of the merged map.
+    /// Reason why it is not merged.
     pub fn refusal(&self) -> Option<&Refusal> {
         self.refusal.as_ref()
     }
@@ -78,7 +78,7 @@ impl Share {
         self.shift.and(self.follower.map()).map(|map| map.stamp_ns)
     }
 
-    /// The map of its epoch: that of before until a new one is complete.
+    /// Map of its epoch: the previous one until a new one is complete.
     fn map(&self) -> Option<&FollowedMap> {
         let maps = self
             .follower
@@ -89,15 +89,15 @@ impl Share {
         own.next()
     }
 
-    /// Its map, if that is complete and of an epoch that was not admitted yet.
+    /// Its map, if it is complete and its epoch was not admitted yet.
     pub(super) fn begun(&self) -> Option<&FollowedMap> {
         self.follower.sequence()?;
         let map = self.follower.map()?;
         (self.epoch != Some(map.info.epoch)).then_some(map)
     }
 
-    /// Makes its map part of the merged one from now on, or says why not; gives its origin. What was part
-    /// of it before goes.
+    /// Merges its map from now on, or returns the reason against it; returns its origin. Its earlier
+    /// contribution is removed.
     pub(super) fn admit(
         &mut self,
         union: &VoxelList,
@@ -116,9 +116,9 @@ impl Share {
         place.map(|_| map.info.has_origin.then_some(map.info.origin))
     }
 
-    /// Adds the cells of the merged map that may have changed; gives the number of those out of its range.
+    /// Appends the merged cells that may have changed; returns the number out of range.
     pub(super) fn take_changed(&mut self, cells: &mut Vec<MortonKey>) -> u64 {
-        // A new map is first to be complete: until then the old one is part of the merged one.
+        // The old map stays merged until a new one is complete.
         let known = self.follower.map().map(|map| map.info.epoch);
         if self.epoch.is_none() || known != self.epoch {
             return 0;
@@ -152,7 +152,7 @@ impl Share {
         out_of_range
     }
 
-    /// Adds what it says of a cell of the merged map; all of its points have the label `robot` if there is one.
+    /// Adds its voxel to a cell of the merged map; all points have the label `robot` if given.
     pub(super) fn add_to(
         &self,
         cell: MortonKey,
@@ -219,7 +219,7 @@ fn place(
     let index = union.lattice().quantize_wide(&map.datum_m);
     let index = index.unwrap_or([i64::MAX; 3]);
     let off_m = (union.lattice().center_wide(index) - map.datum_m).norm();
-    // Not a number is refused too.
+    // NaN is rejected too.
     let on = off_m <= DATUM_SLACK * union.lattice().cell_side_m();
     if !on {
         let datum_m = map.datum_m.into();

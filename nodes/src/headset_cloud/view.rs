@@ -1,47 +1,47 @@
-//! Clouds of what a headset sees of its mesh.
+//! Clouds from ray casting against the headset's mesh.
 
 use lattice_core::pose::Axes;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
-use super::counts::LookCounts;
+use super::counts::ViewCounts;
 use crate::camera::{Classes, LabelledPoints, Pixel, PixelReader, PointLayout};
 use crate::mesh::{LabelledMesh, MeshError, MeshScene};
 
-/// Fewest hits by which a mesh is said to be inside out.
+/// Fewest hits for the winding check.
 const MIN_HITS: u64 = 20;
 
-/// Choice of the pixels that become points.
+/// Selection of the pixels that become points.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LookOptions {
-    /// Every so many columns and rows.
+pub struct ViewOptions {
+    /// Step between columns and between rows.
     pub stride: usize,
-    /// Hits nearer to the camera are none, m.
+    /// Nearer hits are ignored, m.
     pub min_range_m: f64,
-    /// Hits farther from the camera are none, m.
+    /// Farther hits are ignored, m.
     pub max_range_m: f64,
-    /// True if images are refused that see most of the mesh from behind.
+    /// True to reject images that see most of the mesh from behind.
     pub check_winding: bool,
 }
 
-/// A mesh in headset_origin, sorted for ray casting.
-pub(super) struct Room {
+/// Mesh in headset_origin, indexed for ray casting.
+pub(super) struct RaycastMesh {
     mesh: LabelledMesh,
     scene: MeshScene,
 }
 
-/// An image of labels with what its pixels see.
-pub(super) struct Look<'a> {
-    /// Labels and what came with them, read at the pixels of the camera.
+/// Label image with the rays of its pixels.
+pub(super) struct LabelledView<'a> {
+    /// Labels and companion images, sampled at the pixels of the camera.
     pub pixels: PixelReader<'a>,
-    /// x / z and y / z of each pixel of the camera; NaN: none.
+    /// x / z and y / z of each camera pixel; NaN: no ray.
     pub rays: &'a [[f32; 2]],
-    /// Pixels in a row of the camera.
+    /// Camera columns.
     pub width: usize,
-    /// Place of the camera and its turn from optical axes, both in headset_origin and the axes of ROS.
+    /// Camera position and rotation from optical axes, in headset_origin and the axes of ROS.
     pub camera: (Point3<f64>, Matrix3<f64>),
 }
 
-/// `ros_from_optical` of a camera: its pose is in the axes of the headset, its own axes are given.
+/// `ros_from_optical` of a camera, from its pose in the axes of the headset and its own axes.
 pub(super) fn placed(
     origin_from_camera: &Isometry3<f64>,
     headset: Axes,
@@ -49,43 +49,43 @@ pub(super) fn placed(
 ) -> (Point3<f64>, Matrix3<f64>) {
     let place = headset.to_ros(origin_from_camera.translation.vector);
     let turn = origin_from_camera.rotation.to_rotation_matrix();
-    // Each of these matrices is orthonormal: its transpose is the way back.
+    // Each of these matrices is orthonormal: its transpose is its inverse.
     let camera_from_optical = camera.matrix().transpose() * Axes::Optical.matrix();
     let ros_from_optical = headset.matrix() * turn.matrix() * camera_from_optical;
     (place.into(), ros_from_optical)
 }
 
-impl Room {
-    /// Sorts a mesh.
+impl RaycastMesh {
+    /// Indexes a mesh.
     pub fn new(mesh: LabelledMesh) -> Result<Self, MeshError> {
         let scene = MeshScene::new_fast(&mesh)?;
         Ok(Self { mesh, scene })
     }
 
-    /// The points that the pixels see, or how many of how many were seen from behind.
+    /// Points seen by the pixels, or the numbers of hits from behind and of all hits.
     pub fn see(
         &self,
-        look: &mut Look,
-        options: &LookOptions,
+        view: &mut LabelledView,
+        options: &ViewOptions,
         classes: &Classes,
-        counts: &mut LookCounts,
+        counts: &mut ViewCounts,
     ) -> Result<LabelledPoints, [u64; 2]> {
-        let width = look.width.max(1);
-        let height = look.rays.len() / width;
+        let width = view.width.max(1);
+        let height = view.rays.len() / width;
         let stride = options.stride.max(1);
-        let (origin_m, ros_from_optical) = &look.camera;
+        let (origin_m, ros_from_optical) = &view.camera;
         let most = width.div_ceil(stride) * height.div_ceil(stride);
         let layout = PointLayout {
             viewpoint_m: Some(origin_m.coords.map(|c| c as f32).into()),
-            ..look.pixels.layout(classes)
+            ..view.pixels.layout(classes)
         };
         let layout = layout.bounded(most);
-        let (mut points, mut new) = (LabelledPoints::new(layout, 0), LookCounts::default());
+        let (mut points, mut new) = (LabelledPoints::new(layout, 0), ViewCounts::default());
         let (mut hits, mut behind) = (0, 0);
         for row in (0..height).step_by(stride) {
-            look.pixels.seek(row, height);
+            view.pixels.seek(row, height);
             for column in (0..width).step_by(stride) {
-                let Some(&[x, y]) = look.rays.get(row * width + column) else {
+                let Some(&[x, y]) = view.rays.get(row * width + column) else {
                     continue;
                 };
                 new.pixels += 1;
@@ -105,7 +105,7 @@ impl Room {
                 behind += u64::from(self.is_behind(hit.triangle, &direction));
                 let point_m = (origin_m + direction * hit.distance_m).coords;
                 let place: [f32; 3] = point_m.map(|c| c as f32).into();
-                points.push(place, &look.pixels.at(column), classes);
+                points.push(place, &view.pixels.at(column), classes);
             }
         }
         if options.check_winding && hits >= MIN_HITS && 2 * behind > hits {
@@ -117,13 +117,13 @@ impl Room {
         Ok(points)
     }
 
-    /// Points all over the mesh, one for so much of it, with the class of its triangles.
+    /// Points sampled uniformly over the mesh, labelled by its triangles.
     pub fn sampled(
         &self,
         spacing_m: f64,
         max_points: usize,
         classes: &Classes,
-        counts: &mut LookCounts,
+        counts: &mut ViewCounts,
     ) -> LabelledPoints {
         let triangles = || self.mesh.corners_m().zip(self.mesh.labels());
         let area_m2 = |corners: [[f32; 3]; 3]| {
@@ -140,7 +140,7 @@ impl Room {
             while saved_m2 >= each_m2 && points.len() < max_points {
                 saved_m2 -= each_m2;
                 number = number.wrapping_add(1);
-                // Two irrational steps fill a square evenly; half of it is folded onto the other.
+                // Two irrational steps fill a square uniformly; one half is folded onto the other.
                 let step = |part: f64| (f64::from(number) * part).fract();
                 let (mut u, mut v) = (step(0.754_877_666_246_693), step(0.569_840_290_998_053));
                 if u + v > 1.0 {
@@ -156,7 +156,7 @@ impl Room {
         points
     }
 
-    /// True if a ray meets a triangle from where its corners go clockwise.
+    /// True if a ray hits the clockwise side of a triangle.
     fn is_behind(&self, triangle: usize, direction: &Vector3<f64>) -> bool {
         let corners = self.mesh.triangles().get(triangle);
         let vertex = |v: u32| self.mesh.vertices_m().get(v as usize).copied();
@@ -168,7 +168,7 @@ impl Room {
     }
 }
 
-impl LookCounts {
+impl ViewCounts {
     fn add(&mut self, other: &Self) {
         self.pixels += other.pixels;
         self.pixels_no_ray += other.pixels_no_ray;

@@ -1,4 +1,4 @@
-//! Calls of one client over the network, and the correlation of replies with requests.
+//! Remote calls of one client, and the correlation of replies with requests.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
@@ -14,19 +14,19 @@ use crate::peers::Peers;
 use crate::port::{EndpointId, Origin, SampleReader, ServiceForm};
 use crate::sync::lock;
 
-/// Between two looks whether a server knows its client.
+/// Period of checks whether a server has discovered its client.
 const LOOK: Duration = Duration::from_millis(1);
 
-/// Longest time that a first request waits for its server to know the client: the period of Fast DDS's heartbeats, by which
-/// it repairs discovery.
-const ACQUAINTANCE: Duration = Duration::from_secs(3);
+/// Longest wait of a first request for its server to discover the client: the heartbeat period of Fast DDS, after
+/// which it repairs discovery.
+const MATCH_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Calls that wait for answers.
+/// Calls without reply so far.
 #[derive(Default)]
-pub(crate) struct Waiting(Mutex<BTreeMap<Header, Sender<Vec<u8>>>>);
+pub(crate) struct PendingCalls(Mutex<BTreeMap<Header, Sender<Vec<u8>>>>);
 
-impl Waiting {
-    /// Hands an answer to who asked; those of other clients are passed over.
+impl PendingCalls {
+    /// Passes a reply to its call; replies to other clients are ignored.
     fn hear(&self, bytes: &[u8], origin: &Origin) {
         let Some((request, answer)) = read_answer(bytes, origin) else {
             return;
@@ -36,10 +36,10 @@ impl Waiting {
         }
     }
 
-    /// Hears answers until the task is dropped.
+    /// Receives replies until the task is dropped.
     pub(crate) async fn listen(self: Arc<Self>, answers: Arc<dyn SampleReader>) {
         loop {
-            // What cannot be had is no answer; its call ends by time.
+            // A rejected sample is not a reply; its call ends by timeout.
             if let Ok(origin) = answers.next().await {
                 self.hear(&answers.bytes(), &origin);
             }
@@ -48,32 +48,35 @@ impl Waiting {
     }
 }
 
-/// Asks over the network.
-pub(crate) struct Asking {
+/// Remote calls of one client.
+pub(crate) struct RemoteCalls {
     pub form: ServiceForm,
     pub requests: Arc<Outbox>,
-    /// The other ends of the requests.
+    /// Peers of the request writer.
     pub servers: Arc<Peers>,
-    /// The other ends of the answers.
+    /// Peers of the reply reader.
     pub answerers: Arc<Peers>,
     pub answers: Arc<dyn SampleReader>,
-    /// The one that was waited for last.
-    pub acquainted: Mutex<Option<EndpointId>>,
-    pub waiting: Arc<Waiting>,
+    /// Reply writer that was last waited for.
+    pub last_matched: Mutex<Option<EndpointId>>,
+    pub waiting: Arc<PendingCalls>,
     pub next: AtomicI64,
 }
 
-impl Asking {
-    /// Asks once a server is known, and waits for the answer.
+impl RemoteCalls {
+    /// Sends a request once a server is discovered, and waits for the reply.
     pub(crate) async fn call(&self, request: &[u8]) -> Result<Vec<u8>, String> {
         let server = self.servers.known(|_| true).await;
         if self.form == ServiceForm::Topics {
-            let answerer = self.answerers.known(|peer| peer.is_beside(&server)).await;
+            let answerer = self
+                .answerers
+                .known(|peer| peer.same_participant(&server))
+                .await;
             self.until_known_to(&answerer).await;
         }
         let number = self.next.fetch_add(1, Relaxed);
         let asked = write_request(self.form, request, &self.requests.id(), &server, number);
-        let asked = asked.ok_or("the request is no CDR of this order")?;
+        let asked = asked.ok_or("the request is not little-endian CDR")?;
         let (sender, answer) = bounded(1);
         lock(&self.waiting.0).insert(asked.identity, sender);
         let _forgotten = Forget(&self.waiting, asked.identity);
@@ -84,22 +87,22 @@ impl Asking {
         answer.map_err(|_| "the client has ended".to_owned())
     }
 
-    /// Waits until the writer of the answers has matched our reader: a datagram of discovery may be lost on its way there,
-    /// and an answer to nobody is lost for good.
+    /// Waits until the reply writer has matched our reader: the server may miss a discovery datagram, and a
+    /// reply without a matched reader is lost.
     async fn until_known_to(&self, answerer: &EndpointId) {
-        if *lock(&self.acquainted) == Some(*answerer) {
+        if *lock(&self.last_matched) == Some(*answerer) {
             return;
         }
         let begin = Instant::now();
-        while !self.answers.is_known_to(answerer) && begin.elapsed() < ACQUAINTANCE {
+        while !self.answers.is_known_to(answerer) && begin.elapsed() < MATCH_TIMEOUT {
             Timer::after(LOOK).await;
         }
-        *lock(&self.acquainted) = Some(*answerer);
+        *lock(&self.last_matched) = Some(*answerer);
     }
 }
 
-/// Forgets a call that is over, or that nobody waits for any more.
-struct Forget<'a>(&'a Waiting, Header);
+/// Removes a finished or abandoned call when dropped.
+struct Forget<'a>(&'a PendingCalls, Header);
 
 impl Drop for Forget<'_> {
     fn drop(&mut self) {
@@ -114,7 +117,7 @@ mod tests {
 
     #[test]
     fn answers_go_to_who_asked() {
-        let waiting = Waiting::default();
+        let waiting = PendingCalls::default();
         let (sender, answer) = bounded(1);
         lock(&waiting.0).insert([7; 16], sender);
         let sample = SampleId {

@@ -1,68 +1,68 @@
-//! The desk at which one client asks: what is offered there, what it may ask, how much at a time.
+//! Protocol state, permissions and limits of one client.
 
 use std::collections::BTreeMap;
 
 use super::inputs::Input;
 use super::offer::{MAX_MESSAGE_BYTES, Offer, OpenTopic};
-use super::protocol::{self, ClientChannel, ClientData, ClientMessage, Value, Wish};
+use super::protocol::{self, ClientChannel, ClientData, ClientMessage, SubscriptionRequest, Value};
 
-/// Most questions of a client that wait for their answers.
+/// Limit of requests without reply per client.
 const MAX_IN_FLIGHT: usize = 16;
-/// Most channels of a client.
+/// Limit of channels per client.
 const MAX_CHANNELS: usize = 32;
 
-/// A question that others answer.
+/// Request that the bridge executes.
 #[derive(Debug, PartialEq)]
-pub enum Ask {
-    /// Call of a service.
+pub enum BridgeRequest {
+    /// Service call.
     Call {
-        /// Its id.
+        /// Service id.
         service: u32,
-        /// By which the client knows the answer.
+        /// Call id of the client.
         call: u32,
         /// CDR.
         request: Vec<u8>,
     },
-    /// Values of parameters.
+    /// Read parameters.
     GetParameters(Vec<String>, Option<String>),
-    /// Other values.
+    /// Set parameters.
     SetParameters(Vec<Value>, Option<String>),
-    /// A message, on the topic of this place in the offer.
+    /// Publish a message on an offered topic, by its index.
     Publish(usize, Vec<u8>),
 }
 
-/// Consequence of a message of a client.
+/// Action for a client message.
 #[derive(Debug, PartialEq)]
-pub enum Step {
-    /// It wants channels.
-    Subscribe(Vec<Wish>),
-    /// It wants them no more.
+pub enum SessionAction {
+    /// Subscribe to channels.
+    Subscribe(Vec<SubscriptionRequest>),
+    /// Unsubscribe.
     Unsubscribe(Vec<u32>),
-    /// It wants to hear of changes of these parameters, none for all, or does no longer.
+    /// Start or stop watching these parameters; none: all.
     Watch(Vec<String>, bool),
-    /// It wants the graph of nodes, or does no longer.
+    /// Start or stop following the node graph.
     Graph(bool),
-    /// Something is to be asked for.
-    Ask(Ask),
-    /// A message for a headset's topic, which is not answered.
+    /// Pass a request to the bridge.
+    Request(BridgeRequest),
+    /// Publish a message on a headset topic, without a reply.
     Input(Input),
-    /// A text for the client.
-    Tell(String),
-    /// Nothing.
+    /// Send a text to the client.
+    Reply(String),
+    /// No action.
     Done,
 }
 
-/// The state of one client.
+/// Session of one client.
 #[derive(Debug)]
-pub struct Desk<'a> {
+pub struct ClientSession<'a> {
     offer: &'a Offer,
-    /// Topics of the offer by the client's channels; true for those in JSON.
+    /// Offered topics by the client's channel id; true for JSON.
     channels: BTreeMap<u32, (usize, bool)>,
     in_flight: usize,
 }
 
-impl<'a> Desk<'a> {
-    /// A desk at which nobody has asked.
+impl<'a> ClientSession<'a> {
+    /// Session without requests.
     pub fn new(offer: &'a Offer) -> Self {
         Self {
             offer,
@@ -71,35 +71,36 @@ impl<'a> Desk<'a> {
         }
     }
 
-    /// Takes a text message.
-    pub fn text(&mut self, text: &str) -> Step {
+    /// Handles a text message.
+    pub fn on_text(&mut self, text: &str) -> SessionAction {
+        use SessionAction::{Done, Graph, Subscribe, Unsubscribe, Watch};
         if text.len() > MAX_MESSAGE_BYTES {
-            return tell(TOO_LONG);
+            return reject(TOO_LONG);
         }
         match ClientMessage::parse(text) {
-            Ok(ClientMessage::Subscribe { subscriptions }) => Step::Subscribe(subscriptions),
-            Ok(ClientMessage::Unsubscribe { subscription_ids }) => {
-                Step::Unsubscribe(subscription_ids)
-            }
+            Ok(ClientMessage::Subscribe { subscriptions }) => Subscribe(subscriptions),
+            Ok(ClientMessage::Unsubscribe { subscription_ids }) => Unsubscribe(subscription_ids),
             Ok(ClientMessage::GetParameters {
                 parameter_names,
                 id,
-            }) if self.offer.parameters => self.ask(Ask::GetParameters(parameter_names, id)),
+            }) if self.offer.parameters => {
+                self.request(BridgeRequest::GetParameters(parameter_names, id))
+            }
             Ok(ClientMessage::SetParameters { parameters, id }) if self.offer.parameters => {
-                self.ask(Ask::SetParameters(parameters, id))
+                self.request(BridgeRequest::SetParameters(parameters, id))
             }
             Ok(ClientMessage::SubscribeParameterUpdates { parameter_names })
                 if self.offer.parameters =>
             {
-                Step::Watch(parameter_names, true)
+                Watch(parameter_names, true)
             }
             Ok(ClientMessage::UnsubscribeParameterUpdates { parameter_names })
                 if self.offer.parameters =>
             {
-                Step::Watch(parameter_names, false)
+                Watch(parameter_names, false)
             }
-            Ok(ClientMessage::SubscribeConnectionGraph) if self.offer.graph => Step::Graph(true),
-            Ok(ClientMessage::UnsubscribeConnectionGraph) => Step::Graph(false),
+            Ok(ClientMessage::SubscribeConnectionGraph) if self.offer.graph => Graph(true),
+            Ok(ClientMessage::UnsubscribeConnectionGraph) => Graph(false),
             Ok(ClientMessage::Advertise { channels }) if !self.offer.topics.is_empty() => {
                 self.advertise(&channels)
             }
@@ -107,19 +108,19 @@ impl<'a> Desk<'a> {
                 channel_ids
                     .iter()
                     .for_each(|id| _ = self.channels.remove(id));
-                Step::Done
+                Done
             }
-            Ok(_) => tell("this is not offered here; writing is off unless `allow_write` is on"),
-            Err(error) => tell(&error.to_string()),
+            Ok(_) => reject("operation not offered; writing requires `allow_write`"),
+            Err(error) => reject(&error.to_string()),
         }
     }
 
-    /// Takes a binary message.
-    pub fn data(&mut self, bytes: &[u8]) -> Step {
+    /// Handles a binary message.
+    pub fn on_binary(&mut self, bytes: &[u8]) -> SessionAction {
         match ClientData::parse(bytes) {
             Ok(ClientData::Message { channel, payload }) => self.message(channel, payload),
             Ok(ClientData::Call { service, call, .. }) if bytes.len() > MAX_MESSAGE_BYTES => {
-                Step::Tell(protocol::service_failure(service, call, TOO_LONG))
+                SessionAction::Reply(protocol::service_failure(service, call, TOO_LONG))
             }
             Ok(ClientData::Call {
                 service,
@@ -127,60 +128,61 @@ impl<'a> Desk<'a> {
                 encoding,
                 payload,
             }) => {
-                let refuse = |why: &str| Step::Tell(protocol::service_failure(service, call, why));
+                let refuse =
+                    |why: &str| SessionAction::Reply(protocol::service_failure(service, call, why));
                 if service as usize >= self.offer.services.len() {
-                    return refuse("there is no such service; `allow_write` may be off");
+                    return refuse("unknown service; writing requires `allow_write`");
                 }
                 if encoding != b"cdr" {
-                    return refuse("requests are taken as cdr alone");
+                    return refuse("the encoding of requests must be cdr");
                 }
                 let request = payload.to_vec();
-                match self.ask(Ask::Call {
+                match self.request(BridgeRequest::Call {
                     service,
                     call,
                     request,
                 }) {
-                    Step::Tell(_) => refuse(TOO_MANY),
+                    SessionAction::Reply(_) => refuse(TOO_MANY),
                     step => step,
                 }
             }
-            Err(error) => tell(&error.to_string()),
+            Err(error) => reject(&error.to_string()),
         }
     }
 
-    fn message(&mut self, channel: u32, payload: &[u8]) -> Step {
+    fn message(&mut self, channel: u32, payload: &[u8]) -> SessionAction {
         let Some(&(topic, is_json)) = self.channels.get(&channel) else {
-            return tell(&format!("channel {channel} is not yours to publish on"));
+            return reject(&format!("channel {channel} is not advertised"));
         };
         let streams = self.offer.topics.get(topic);
         if streams.is_some_and(|topic| topic.stream_bytes.is_some()) {
             let bytes = payload.to_vec();
-            return Step::Input(Input {
+            return SessionAction::Input(Input {
                 topic,
                 is_json,
                 bytes,
             });
         }
         match payload.len() > MAX_MESSAGE_BYTES {
-            true => tell(TOO_LONG),
-            false => self.ask(Ask::Publish(topic, payload.to_vec())),
+            true => reject(TOO_LONG),
+            false => self.request(BridgeRequest::Publish(topic, payload.to_vec())),
         }
     }
 
-    /// To be called for each answer.
+    /// To be called for each reply.
     pub fn answered(&mut self) {
         self.in_flight = self.in_flight.saturating_sub(1);
     }
 
-    fn ask(&mut self, ask: Ask) -> Step {
+    fn request(&mut self, request: BridgeRequest) -> SessionAction {
         if self.in_flight >= MAX_IN_FLIGHT {
-            return tell(TOO_MANY);
+            return reject(TOO_MANY);
         }
         self.in_flight += 1;
-        Step::Ask(ask)
+        SessionAction::Request(request)
     }
 
-    fn advertise(&mut self, channels: &[ClientChannel]) -> Step {
+    fn advertise(&mut self, channels: &[ClientChannel]) -> SessionAction {
         for channel in channels {
             let fits = |topic: &OpenTopic| {
                 topic.name == channel.topic && topic.type_name == channel.schema_name
@@ -196,24 +198,24 @@ impl<'a> Desk<'a> {
             let is_read = |at: &usize| channel.encoding == "cdr" || is_json && streams(*at);
             match topic.filter(|at| room && free && is_read(at)) {
                 Some(topic) => _ = self.channels.insert(channel.id, (topic, is_json)),
-                None => return tell(&refusal(channel, &self.offer.topics)),
+                None => return reject(&refusal(channel, &self.offer.topics)),
             }
         }
-        Step::Done
+        SessionAction::Done
     }
 }
 
 const TOO_LONG: &str = "a message above 64 kB";
-const TOO_MANY: &str = "too many questions wait for their answers";
+const TOO_MANY: &str = "too many requests without a reply; wait for replies";
 
-fn tell(problem: &str) -> Step {
-    Step::Tell(protocol::status(problem))
+fn reject(problem: &str) -> SessionAction {
+    SessionAction::Reply(protocol::status(problem))
 }
 
 fn refusal(channel: &ClientChannel, topics: &[OpenTopic]) -> String {
     let open = topics.iter().map(|topic| topic.name.as_str());
     format!(
-        "channel {} is not taken: topics that are open, as cdr: {}",
+        "channel {} is rejected; open topics, as cdr: {}",
         channel.id,
         open.collect::<Vec<_>>().join(", ")
     )
@@ -223,6 +225,7 @@ fn refusal(channel: &ClientChannel, topics: &[OpenTopic]) -> String {
 mod tests {
     use proptest::prelude::*;
 
+    use super::SessionAction::{Done, Graph, Reply, Request, Watch};
     use super::*;
     use crate::viewer_server::protocol::AdvertisedService;
 
@@ -270,7 +273,7 @@ mod tests {
     fn nothing_can_be_written_where_nothing_is_offered() {
         let offer = Offer::default();
         assert!(offer.capabilities().is_empty());
-        let mut desk = Desk::new(&offer);
+        let mut session = ClientSession::new(&offer);
         for text in [
             ADVERTISE,
             WATCH,
@@ -278,56 +281,59 @@ mod tests {
             r#"{"op":"getParameters","parameterNames":[]}"#,
             r#"{"op":"setParameters","parameters":[{"name":"/a.b","value":1}]}"#,
         ] {
-            assert!(matches!(desk.text(text), Step::Tell(_)), "{text}");
+            assert!(matches!(session.on_text(text), Reply(_)), "{text}");
         }
         for bytes in [call(0, b"cdr"), vec![1, 3, 0, 0, 0, 0, 1, 0, 0]] {
-            assert!(matches!(desk.data(&bytes), Step::Tell(_)));
+            assert!(matches!(session.on_binary(&bytes), Reply(_)));
         }
     }
 
     #[test]
     fn what_is_offered_is_asked_for_up_to_a_number() {
         let offer = offer();
-        let mut desk = Desk::new(&offer);
+        let mut session = ClientSession::new(&offer);
         let refused = [call(1, b"cdr"), call(u32::MAX, b"cdr"), call(0, b"json")];
         for bytes in &refused {
-            let Step::Tell(text) = desk.data(bytes) else {
+            let Reply(text) = session.on_binary(bytes) else {
                 panic!("{bytes:?} was taken");
             };
             assert!(text.contains("serviceCallFailure") && text.contains("\"callId\":7"));
         }
         let names = vec!["/a.b".to_owned()];
-        assert_eq!(desk.text(WATCH), Step::Watch(names.clone(), true));
+        assert_eq!(session.on_text(WATCH), Watch(names.clone(), true));
         let unwatch = WATCH.replace("subscribe", "unsubscribe");
-        assert_eq!(desk.text(&unwatch), Step::Watch(names, false));
-        assert_eq!(desk.text(GRAPH), Step::Graph(true));
+        assert_eq!(session.on_text(&unwatch), Watch(names, false));
+        assert_eq!(session.on_text(GRAPH), Graph(true));
         let unfollow = GRAPH.replace("subscribe", "unsubscribe");
-        assert_eq!(desk.text(&unfollow), Step::Graph(false));
+        assert_eq!(session.on_text(&unfollow), Graph(false));
         let all = r#"{"op":"subscribeParameterUpdates"}"#;
-        assert_eq!(desk.text(all), Step::Watch(Vec::new(), true));
-        assert_eq!(desk.text(ADVERTISE), Step::Done);
-        assert!(matches!(desk.text(ADVERTISE), Step::Tell(_)), "twice");
+        assert_eq!(session.on_text(all), Watch(Vec::new(), true));
+        assert_eq!(session.on_text(ADVERTISE), Done);
+        assert!(matches!(session.on_text(ADVERTISE), Reply(_)), "twice");
         let other = ADVERTISE
             .replace("goal_pose", "cmd_vel")
             .replace(":3", ":4");
-        assert!(matches!(desk.text(&other), Step::Tell(_)), "not open");
+        assert!(matches!(session.on_text(&other), Reply(_)), "not open");
         for _ in 0..MAX_IN_FLIGHT - 1 {
             assert!(matches!(
-                desk.data(&call(0, b"cdr")),
-                Step::Ask(Ask::Call { call: 7, .. })
+                session.on_binary(&call(0, b"cdr")),
+                Request(BridgeRequest::Call { call: 7, .. })
             ));
         }
         let publish = [1, 3, 0, 0, 0, 9];
-        assert_eq!(desk.data(&publish), Step::Ask(Ask::Publish(0, vec![9])));
-        assert!(matches!(desk.data(&publish), Step::Tell(_)), "too many");
-        desk.answered();
-        assert!(matches!(desk.data(&publish), Step::Ask(_)));
-        desk.answered();
         assert_eq!(
-            desk.text(r#"{"op":"unadvertise","channelIds":[3]}"#),
-            Step::Done
+            session.on_binary(&publish),
+            Request(BridgeRequest::Publish(0, vec![9]))
         );
-        assert!(matches!(desk.data(&publish), Step::Tell(_)), "no longer");
+        assert!(matches!(session.on_binary(&publish), Reply(_)), "too many");
+        session.answered();
+        assert!(matches!(session.on_binary(&publish), Request(_)));
+        session.answered();
+        assert_eq!(
+            session.on_text(r#"{"op":"unadvertise","channelIds":[3]}"#),
+            Done
+        );
+        assert!(matches!(session.on_binary(&publish), Reply(_)), "no longer");
     }
 
     #[test]
@@ -335,15 +341,15 @@ mod tests {
         let offer = offer();
         assert_eq!(offer.max_message_bytes(), 100_005);
         assert_eq!(Offer::default().max_message_bytes(), MAX_MESSAGE_BYTES);
-        let mut desk = Desk::new(&offer);
+        let mut session = ClientSession::new(&offer);
         let pose = ADVERTISE.replace("/goal_pose", "/headset/pose");
-        assert_eq!(desk.text(&pose), Step::Done);
+        assert_eq!(session.on_text(&pose), Done);
         let json = pose.replace(":3", ":4").replace("\"cdr", "\"json");
-        assert_eq!(desk.text(&json), Step::Done);
+        assert_eq!(session.on_text(&json), Done);
         let goal = ADVERTISE.replace(":3", ":5");
-        assert_eq!(desk.text(&goal), Step::Done);
+        assert_eq!(session.on_text(&goal), Done);
         let json_goal = goal.replace(":5", ":6").replace("\"cdr", "\"json");
-        assert!(matches!(desk.text(&json_goal), Step::Tell(_)));
+        assert!(matches!(session.on_text(&json_goal), Reply(_)));
         let message = |channel: u8, length: usize| {
             let head = [1, channel, 0, 0, 0];
             [&head[..], &vec![7; length]].concat()
@@ -356,16 +362,19 @@ mod tests {
                     is_json,
                     bytes,
                 };
-                assert_eq!(desk.data(&message(channel, 90_000)), Step::Input(input));
+                assert_eq!(
+                    session.on_binary(&message(channel, 90_000)),
+                    SessionAction::Input(input)
+                );
             }
         }
-        assert!(matches!(desk.data(&message(5, 90_000)), Step::Tell(_)));
-        assert!(matches!(desk.data(&message(5, 1)), Step::Ask(_)));
+        assert!(matches!(session.on_binary(&message(5, 90_000)), Reply(_)));
+        assert!(matches!(session.on_binary(&message(5, 1)), Request(_)));
         let long = "x".repeat(90_000);
-        assert_eq!(desk.text(&long), tell(TOO_LONG));
+        assert_eq!(session.on_text(&long), reject(TOO_LONG));
         let mut long = call(0, b"cdr");
         long.resize(90_000, 0);
-        assert!(matches!(desk.data(&long), Step::Tell(text) if text.contains("above 64 kB")));
+        assert!(matches!(session.on_binary(&long), Reply(text) if text.contains("above 64 kB")));
     }
 
     proptest! {
@@ -373,7 +382,7 @@ mod tests {
         #[test]
         fn mutated_messages_do_not_panic(changes in prop::collection::vec((0..200usize, any::<u8>()), 0..8), cut in 0..200usize) {
             let offer = offer();
-            let mut desk = Desk::new(&offer);
+            let mut session = ClientSession::new(&offer);
             for seed in [ADVERTISE.as_bytes(), WATCH.as_bytes(), &call(0, b"cdr")] {
                 let mut bytes = seed.to_vec();
                 for (at, byte) in &changes {
@@ -381,9 +390,9 @@ mod tests {
                     bytes[at] = *byte;
                 }
                 bytes.truncate(cut);
-                desk.data(&bytes);
-                desk.text(&String::from_utf8_lossy(&bytes));
-                prop_assert!(desk.in_flight <= MAX_IN_FLIGHT && desk.channels.len() <= MAX_CHANNELS);
+                session.on_binary(&bytes);
+                session.on_text(&String::from_utf8_lossy(&bytes));
+                prop_assert!(session.in_flight <= MAX_IN_FLIGHT && session.channels.len() <= MAX_CHANNELS);
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Files that take their place whole: on a full disk, at an error or a kill the one before stays.
+//! Atomic file writes: on a full disk, an error or a kill the previous file stays.
 
 use std::error::Error;
 use std::fs::{self, File};
@@ -9,27 +9,27 @@ use std::path::{Path, PathBuf};
 use rustix::fs::{AtFlags, CWD, Mode, OFlags, linkat, open};
 use tempfile::{Builder, NamedTempFile, TempPath};
 
-/// Any error on its way to the user.
+/// Boxed error for the user.
 type AnyError = Box<dyn Error + Send + Sync>;
 
-/// A file that is being written; dropped before [`WholeFile::finish`] it leaves nothing.
-pub struct WholeFile {
+/// File being written; dropping it before [`AtomicFile::finish`] leaves no file.
+pub struct AtomicFile {
     out: BufWriter<File>,
     place: Place,
 }
 
-/// Way of a file to its path.
+/// Temporary location of a file.
 enum Place {
-    /// A pipe or device, which no file takes the place of, is written at once.
+    /// A pipe or device, written directly.
     There,
-    /// No name yet, so that a kill leaves nothing.
+    /// An unnamed file, which a kill removes.
     Unnamed(PathBuf),
-    /// A name of its own in the folder, where files need one.
+    /// A temporary name in the folder, for file systems without unnamed files.
     Beside(TempPath, PathBuf),
 }
 
-impl WholeFile {
-    /// Begins a file for a path; a folder that is not there or not writable is noticed here.
+impl AtomicFile {
+    /// Creates a file for a path; fails if the folder is missing or not writable.
     pub fn create(path: &Path) -> io::Result<Self> {
         let (file, place) = match fs::metadata(path) {
             Ok(found) if found.is_dir() => return Err(ErrorKind::IsADirectory.into()),
@@ -60,7 +60,7 @@ impl WholeFile {
         })
     }
 
-    /// Brings everything to the disk, then takes the place.
+    /// Syncs the data to disk, then replaces the path.
     pub fn finish(self) -> io::Result<()> {
         let file = self.out.into_inner().map_err(|error| error.into_error())?;
         let (named, to) = match self.place {
@@ -75,7 +75,7 @@ impl WholeFile {
             }
         };
         named.persist(&to).map_err(|error| error.error)?;
-        // The file is there; not every file system can bring its name to the disk.
+        // The file is complete; not every file system can sync its directory entry.
         let _ = File::open(folder(&to)?).and_then(|folder| folder.sync_all());
         Ok(())
     }
@@ -94,7 +94,7 @@ fn unnamed(folder: &Path) -> io::Result<File> {
     Ok(open(folder, flags, Mode::from_raw_mode(0o666))?.into())
 }
 
-/// Gives a file without a name one that nothing has.
+/// Gives an unnamed file a unique name.
 fn named(file: &File, folder: &Path) -> io::Result<NamedTempFile<()>> {
     use std::os::fd::AsRawFd;
     let open = format!("/proc/self/fd/{}", file.as_raw_fd());
@@ -105,7 +105,7 @@ fn named(file: &File, folder: &Path) -> io::Result<NamedTempFile<()>> {
     Builder::new().prefix(".").make_in(folder, link)
 }
 
-impl Write for WholeFile {
+impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.out.write(bytes)
     }
@@ -115,26 +115,26 @@ impl Write for WholeFile {
     }
 }
 
-impl Seek for WholeFile {
+impl Seek for AtomicFile {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.out.seek(to)
     }
 }
 
-/// Writes a file by what fills it; errors begin with its path.
+/// Writes a file with a closure; errors begin with its path.
 pub fn write<T, E: Into<AnyError>>(
     path: &Path,
-    fill: impl FnOnce(&mut WholeFile) -> Result<T, E>,
+    fill: impl FnOnce(&mut AtomicFile) -> Result<T, E>,
 ) -> Result<T, AnyError> {
     let named = |error: AnyError| -> AnyError { format!("{}: {error}", path.display()).into() };
-    let mut file = WholeFile::create(path).map_err(|error| named(error.into()))?;
+    let mut file = AtomicFile::create(path).map_err(|error| named(error.into()))?;
     let filled = fill(&mut file).map_err(|error| named(error.into()))?;
     let finished = file.finish();
     finished.map_err(|error| named(error.into()))?;
     Ok(filled)
 }
 
-/// Writes a file of text.
+/// Writes a text file.
 pub fn write_text(path: &Path, text: &str) -> Result<(), AnyError> {
     write(path, |file| file.write_all(text.as_bytes()))
 }

@@ -1,4 +1,4 @@
-//! The graph of other processes: endpoints that discovery finds, and the nodes that are said to have them.
+//! ROS graph of other processes: discovered endpoints and the nodes that own them.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -11,7 +11,7 @@ use super::port::EndpointId;
 use super::remote::GraphRole;
 use super::sync::lock;
 
-/// Endpoints that are remembered, at most.
+/// Limit of stored endpoints.
 const MAX_ENDPOINTS: usize = 8192;
 
 /// Longest name of a topic, service or node, bytes.
@@ -24,23 +24,23 @@ pub struct GraphEndpoint {
     pub role: GraphRole,
     /// Full name of the topic or service.
     pub name: String,
-    /// Full name of its node; its identity in hexadecimal digits where no node says that it is its own.
+    /// Full name of its node, or its GUID in hexadecimal if no node claims it.
     pub node: String,
 }
 
-/// Endpoints in other processes, by identity.
+/// Discovered endpoints by GUID.
 #[derive(Default)]
-pub(crate) struct Neighbours(Mutex<Known>);
+pub(crate) struct DiscoveredGraph(Mutex<DiscoveredEndpoints>);
 
 #[derive(Default)]
-struct Known {
+struct DiscoveredEndpoints {
     endpoints: BTreeMap<EndpointId, (GraphRole, String)>,
-    /// Full names of the nodes of endpoints.
+    /// Full node name of each endpoint.
     nodes: BTreeMap<EndpointId, String>,
 }
 
-impl Neighbours {
-    /// An endpoint has been found, or tells of itself again.
+impl DiscoveredGraph {
+    /// Adds or updates an endpoint.
     pub(crate) fn add(&self, id: EndpointId, role: GraphRole, name: &str, node: Option<String>) {
         let known = &mut *lock(&self.0);
         if name.len() > MAX_NAME_BYTES
@@ -54,16 +54,16 @@ impl Neighbours {
         }
     }
 
-    /// Endpoints have gone.
+    /// Removes endpoints.
     pub(crate) fn remove(&self, gone: impl Fn(&EndpointId) -> bool) {
         let mut known = lock(&self.0);
         known.endpoints.retain(|id, _| !gone(id));
         known.nodes.retain(|id, _| !gone(id));
     }
 
-    /// Takes a message of `ros_discovery_info`, whose identities have 24 bytes up to Humble and 16 since: of one
-    /// length it is none of the other. A participant speaks for its own endpoints alone.
-    pub(crate) fn hear(&self, message: &[u8]) -> Result<(), CdrError> {
+    /// Takes a message of `ros_discovery_info`. GIDs have 24 bytes up to Humble and 16 bytes since; the two
+    /// lengths cannot be confused. A participant's claims apply to its own endpoints only.
+    pub(crate) fn on_message(&self, message: &[u8]) -> Result<(), CdrError> {
         match cdr::from_slice::<ParticipantEntitiesInfo<[u8; 16]>>(message) {
             Ok(message) => self.keep(message),
             Err(error) => match cdr::from_slice::<ParticipantEntitiesInfo<[u8; 24]>>(message) {
@@ -80,7 +80,7 @@ impl Neighbours {
             return;
         };
         let nodes = &mut lock(&self.0).nodes;
-        nodes.retain(|id, _| !id.is_beside(&participant));
+        nodes.retain(|id, _| !id.same_participant(&participant));
         for node in &message.node_entities_info_seq {
             let NodeEntitiesInfo {
                 node_name,
@@ -90,7 +90,7 @@ impl Neighbours {
             } = node;
             let name = names::fully_qualified(node_name, node_namespace);
             let ids = reader_gid_seq.iter().chain(writer_gid_seq).filter_map(id);
-            for id in ids.filter(|id| id.is_beside(&participant)) {
+            for id in ids.filter(|id| id.same_participant(&participant)) {
                 if nodes.len() < MAX_ENDPOINTS && name.len() <= MAX_NAME_BYTES {
                     nodes.insert(id, name.clone());
                 }
@@ -98,7 +98,7 @@ impl Neighbours {
         }
     }
 
-    /// Those that are known by now.
+    /// All known endpoints.
     pub(crate) fn all(&self) -> Vec<GraphEndpoint> {
         let known = lock(&self.0);
         let endpoint = |(id, (role, name)): (&EndpointId, &(GraphRole, String))| GraphEndpoint {
@@ -136,22 +136,22 @@ mod tests {
 
     #[test]
     fn endpoints_are_of_the_nodes_that_their_participant_names() {
-        let all = Neighbours::default();
+        let all = DiscoveredGraph::default();
         all.add(WRITER, GraphRole::Publisher, "/map", None);
         assert_eq!(all.all()[0].node, "07".repeat(16));
-        all.hear(&message(9, WRITER.0)).unwrap();
+        all.on_message(&message(9, WRITER.0)).unwrap();
         assert_eq!(all.all()[0].node, "07".repeat(16), "said by another");
-        all.hear(&message(7, WRITER.0)).unwrap();
+        all.on_message(&message(7, WRITER.0)).unwrap();
         let expected = GraphEndpoint {
             role: GraphRole::Publisher,
             name: "/map".to_owned(),
             node: "/robot/mapper".to_owned(),
         };
         assert_eq!(all.all(), std::slice::from_ref(&expected));
-        all.hear(&message(7, [8; 16])).unwrap();
+        all.on_message(&message(7, [8; 16])).unwrap();
         assert_eq!(all.all()[0].node, "07".repeat(16), "no longer its own");
         // As Humble says it.
-        all.hear(&of_identities([7_u8; 24], [7; 24])).unwrap();
+        all.on_message(&of_identities([7_u8; 24], [7; 24])).unwrap();
         assert_eq!(all.all(), [expected]);
         all.remove(|id| *id == WRITER);
         assert!(all.all().is_empty());
@@ -159,10 +159,10 @@ mod tests {
 
     #[test]
     fn what_is_sent_is_bounded_and_may_be_cut() {
-        let all = Neighbours::default();
+        let all = DiscoveredGraph::default();
         let whole = message(7, WRITER.0);
         for length in 0..whole.len() {
-            assert!(all.hear(&whole[..length]).is_err(), "{length}");
+            assert!(all.on_message(&whole[..length]).is_err(), "{length}");
         }
         let long = "x".repeat(MAX_NAME_BYTES + 1);
         all.add(WRITER, GraphRole::Publisher, &long, None);

@@ -1,4 +1,4 @@
-//! Meeting place of the node's thread, which offers messages, and the clients, which take them.
+//! Distribution of messages from the node's thread to all clients.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, OnceLock};
@@ -11,7 +11,7 @@ use smol::channel::{Receiver, bounded};
 
 use super::bridge::Bridge;
 use super::client::Client;
-use super::counts::HubCounts;
+use super::counts::BroadcasterCounts;
 use super::graph::ConnectionGraph;
 use super::inputs::InputRefusal;
 use super::map_stream::{Entry, MapStream};
@@ -19,16 +19,16 @@ use super::offer::Offer;
 use super::outbox::{Class, Outbox, Outgoing};
 use super::protocol::{self, Advertised, Value};
 
-/// Most bytes of updates of the map that are kept for clients that are behind.
+/// Limit of map update bytes kept for slow clients.
 const MAX_UPDATE_BYTES: usize = 8 << 20;
 
-/// Channels, the map and the clients of a server.
-pub struct Hub {
+/// Channels, map stream and clients of a server.
+pub struct Broadcaster {
     max_clients: usize,
     session: String,
     source: &'static str,
     bridge: OnceLock<Box<dyn Bridge>>,
-    /// That of a hub without a bridge.
+    /// Offer without a bridge.
     nothing: Offer,
     inner: Mutex<Inner>,
 }
@@ -38,37 +38,37 @@ struct Inner {
     stream: MapStream,
     clients: BTreeMap<u64, Client>,
     next_client: u64,
-    counts: HubCounts,
-    /// As those who follow it know it.
+    counts: BroadcasterCounts,
+    /// Graph as last sent to its followers.
     graph: ConnectionGraph,
 }
 
 struct Channel {
     advertised: Advertised,
     class: Class,
-    /// True if who comes late gets the last message.
+    /// True if late joiners receive the last message.
     kept: bool,
     last: Option<Entry>,
-    /// Subscriptions so far.
+    /// Number of subscriptions so far.
     joined: u64,
 }
 
-/// Wish for a channel.
+/// Demand for a channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Demand {
-    /// Clients that have it now.
+    /// Current subscribers.
     pub clients: usize,
-    /// Times that a client asked for it.
+    /// Number of subscriptions so far.
     pub joined: u64,
 }
 
-impl Hub {
-    /// A hub without channels, for `max_clients`.
+impl Broadcaster {
+    /// A broadcaster without channels, for `max_clients`.
     pub fn new(max_clients: usize) -> Self {
         Self::of("live", max_clients)
     }
 
-    /// The same for a map of a file, which does not change.
+    /// A broadcaster for the constant map of a file.
     pub fn of_file(max_clients: usize) -> Self {
         Self::of("file", max_clients)
     }
@@ -86,30 +86,30 @@ impl Hub {
                 stream: MapStream::new(MAX_UPDATE_BYTES),
                 clients: BTreeMap::new(),
                 next_client: 0,
-                counts: HubCounts::default(),
+                counts: BroadcasterCounts::default(),
                 graph: ConnectionGraph::default(),
             }),
         }
     }
 
-    /// Lets clients ask for more than is shown, from the first client on.
+    /// Sets the bridge, before the first client connects.
     pub fn set_bridge(&self, bridge: Box<dyn Bridge>) {
         if self.bridge.set(bridge).is_err() {
-            log::debug!("there is a bridge already");
+            log::debug!("the bridge is set already");
         }
     }
 
-    /// The way to nodes, if clients have one.
+    /// Bridge to nodes, if set.
     pub fn bridge(&self) -> Option<&dyn Bridge> {
         self.bridge.get().map(AsRef::as_ref)
     }
 
-    /// All that clients may ask for.
+    /// Capabilities offered to clients.
     pub fn offer_of_bridge(&self) -> &Offer {
         self.bridge().map_or(&self.nothing, Bridge::offer)
     }
 
-    /// Adds the channels of the map, in both forms, of a node's topics.
+    /// Adds the map channels of a node's topics, in full and thin form.
     pub fn map_channels(&self, map: &str, updates: &str) {
         self.channel::<LatticeMap>(map, Class::Map, false);
         self.channel::<LatticeMapUpdate>(updates, Class::Updates, false);
@@ -117,7 +117,7 @@ impl Hub {
         self.channel::<LatticeMapUpdate>(&format!("{updates}_thin"), Class::ThinUpdates, false);
     }
 
-    /// Adds a channel before the first client comes; gives its id.
+    /// Adds a channel before the first client connects; returns its id.
     pub fn channel<M: RosMessage>(&self, topic: &str, class: Class, kept: bool) -> u32 {
         let mut inner = lock(&self.inner);
         let id = inner.channels.len() as u32;
@@ -138,7 +138,7 @@ impl Hub {
         id
     }
 
-    /// Offers a message to who wants it.
+    /// Queues a message for all subscribers of a channel.
     pub fn offer(&self, channel: u32, cdr: Vec<u8>) {
         let message = entry(cdr);
         let mut inner = lock(&self.inner);
@@ -154,7 +154,7 @@ impl Hub {
         }
     }
 
-    /// Changes the stream of the map, and wakes who follows it.
+    /// Changes the map stream, and wakes all clients.
     pub fn change_map(&self, change: impl FnOnce(&mut MapStream)) {
         let mut inner = lock(&self.inner);
         change(&mut inner.stream);
@@ -168,7 +168,7 @@ impl Hub {
         clients.any(|client| client.outbox.waits_for_keyframe())
     }
 
-    /// Wish for a channel.
+    /// Demand for a channel.
     pub fn demand(&self, channel: u32) -> Demand {
         let inner = lock(&self.inner);
         let has = |client: &&Client| client.outbox.channels().any(|id| id == channel);
@@ -181,39 +181,39 @@ impl Hub {
         }
     }
 
-    /// Clients there are.
+    /// Number of clients.
     pub fn clients(&self) -> usize {
         lock(&self.inner).clients.len()
     }
 
-    /// True if every client has taken all that there was.
+    /// True if every client has taken all messages.
     pub fn is_drained(&self) -> bool {
         lock(&self.inner).clients.values().all(|client| client.idle)
     }
 
     /// Counters.
-    pub fn counts(&self) -> HubCounts {
+    pub fn counts(&self) -> BroadcasterCounts {
         let inner = lock(&self.inner);
         let boxes = inner.clients.values().map(|client| &client.outbox);
         let waiting: u64 = boxes.map(Outbox::dropped).sum();
-        HubCounts {
+        BroadcasterCounts {
             maps_restarted: inner.stream.fallen_behind(),
             messages_dropped: inner.counts.messages_dropped + waiting,
             ..inner.counts
         }
     }
 
-    /// Counts a client that was closed since it took too little.
+    /// Counts a client that was closed because it did not read.
     pub fn count_stalled(&self) {
         lock(&self.inner).counts.clients_stalled += 1;
     }
 
-    /// Counts connections that gave way to newer ones.
+    /// Counts connections displaced by newer ones.
     pub fn count_displaced(&self, connections: u64) {
         lock(&self.inner).counts.connections_displaced += connections;
     }
 
-    /// Lets a client in; `None` if all places are taken. The receiver wakes it.
+    /// Adds a client; `None` if `max_clients` is reached. The receiver wakes the client's task.
     pub fn enter(&self) -> Option<(u64, Receiver<()>)> {
         let mut inner = lock(&self.inner);
         if inner.clients.len() >= self.max_clients {
@@ -241,7 +241,7 @@ impl Hub {
         Some((id, woken))
     }
 
-    /// Forgets a client.
+    /// Removes a client.
     pub fn leave(&self, id: u64) {
         let mut inner = lock(&self.inner);
         if let Some(client) = inner.clients.remove(&id) {
@@ -278,31 +278,31 @@ impl Hub {
         }
     }
 
-    /// Puts a message of the protocol before what waits.
-    pub fn tell(&self, id: u64, message: Outgoing) {
+    /// Queues a protocol message ahead of data.
+    pub fn enqueue(&self, id: u64, message: Outgoing) {
         if let Some(client) = lock(&self.inner).clients.get_mut(&id) {
-            client.tell(message);
+            client.enqueue(message);
         }
     }
 
-    /// Tells a client that a message of it was refused, at most once a second.
+    /// Notifies a client of a rejected message, at most once a second.
     pub fn refuse(&self, id: u64, refusal: InputRefusal) {
         if let Some(client) = lock(&self.inner).clients.get_mut(&id) {
             client.refuse(refusal);
         }
     }
 
-    /// Tells a client of changes of these parameters, none for all, or does no longer.
+    /// Starts or stops notifications of these parameters (none: all) for a client.
     pub fn watch(&self, id: u64, names: Vec<String>, watch: bool) {
         if let Some(client) = lock(&self.inner).clients.get_mut(&id)
             && !client.watched.change(names, watch)
         {
-            let problem = "too many names of parameters; none is watched now";
+            let problem = "parameter names exceed 64 KiB; no parameter is watched";
             client.outbox.control(protocol::status(problem));
         }
     }
 
-    /// Tells of parameters that have changed to who watches them.
+    /// Sends changed parameters to the clients that watch them.
     pub fn parameters_changed(&self, values: &[Value]) {
         for client in lock(&self.inner).clients.values_mut() {
             let wanted = values.iter().filter(|of| client.watched.wants(&of.name));
@@ -315,7 +315,7 @@ impl Hub {
         }
     }
 
-    /// Tells a client of the graph of nodes, all that is known and then its changes, or does no longer.
+    /// Starts or stops graph updates for a client; the first message is the whole graph.
     pub fn follow_graph(&self, id: u64, follow: bool) {
         let mut inner = lock(&self.inner);
         let Inner { clients, graph, .. } = &mut *inner;
@@ -323,7 +323,7 @@ impl Hub {
         if let Some(client) = clients.get_mut(&id) {
             if follow && !client.follows_graph {
                 if !followed {
-                    // Nobody has kept it up to date.
+                    // The graph was not updated without followers.
                     *graph = ConnectionGraph::default();
                 }
                 client.outbox.control(graph.whole());
@@ -338,7 +338,7 @@ impl Hub {
         inner.clients.values().any(|client| client.follows_graph)
     }
 
-    /// Tells who follows the graph of what has changed.
+    /// Sends graph changes to its followers.
     pub fn set_graph(&self, graph: ConnectionGraph) {
         let mut inner = lock(&self.inner);
         if let Some(message) = graph.since(&inner.graph) {
@@ -351,7 +351,7 @@ impl Hub {
         }
     }
 
-    /// Gives a client messages of a channel.
+    /// Subscribes a client to a channel.
     pub fn subscribe(&self, id: u64, subscription: u32, channel_id: u32) {
         let mut inner = lock(&self.inner);
         let Inner {
@@ -366,7 +366,7 @@ impl Hub {
         };
         if !outbox.subscribe(subscription, channel_id, channel.class) {
             let topic = &channel.advertised.topic;
-            let problem = format!("subscription {subscription} or one to {topic} is there already");
+            let problem = format!("subscription {subscription}, or one to {topic}, exists already");
             return outbox.control(protocol::status(&problem));
         }
         channel.joined += 1;
@@ -376,7 +376,7 @@ impl Hub {
     }
 }
 
-/// A message that comes now.
+/// Stream entry of a message, stamped now.
 pub fn entry(cdr: Vec<u8>) -> Entry {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     Entry {
