@@ -317,10 +317,13 @@ fn options_that_cannot_be_are_refused() {
         ..good.evidence
     };
     for (bad, expected) in [
-        (range(0.0), "max_range_m 0"),
-        (range(f64::NAN), "max_range_m NaN"),
-        (with_level(Some(4)), "free_level 4"),
-        (FreeSpaceOptions { max_bytes, ..good }, "max_bytes 1000"),
+        (range(0.0), "max range 0 m"),
+        (range(f64::NAN), "max range NaN m"),
+        (with_level(Some(4)), "free level 4 "),
+        (
+            FreeSpaceOptions { max_bytes, ..good },
+            "memory limit 1000 bytes",
+        ),
         (FreeSpaceOptions { evidence, ..good }, "hit 0.4"),
     ] {
         let lattice = Lattice::new(LatticeKind::Fcc, 1.0).unwrap();
