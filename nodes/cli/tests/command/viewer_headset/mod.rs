@@ -125,7 +125,7 @@ fn hostile(mut client: Client, url: &str) {
         let channel = json!({"id": id, "topic": topic, "encoding": "cdr", "schemaName": type_name});
         client.say(&json!({"op": "advertise", "channels": [channel]}));
         let said = text_within(&mut client);
-        assert!(said.contains("is not taken"), "{topic}: {said}");
+        assert!(said.contains("is rejected"), "{topic}: {said}");
     }
     client.send(mesh.unwrap() as u32, &vec![0; 1_100_000]);
     let late = Instant::now() + PATIENCE;
