@@ -347,7 +347,7 @@ fn maps_and_clouds_in_utm_are_registered_as_those_about_their_origin() {
         "0.00001",
     ]);
     assert!(
-        error.contains("is 6.0 m long: take 1.2e-5 m or more"),
+        error.contains("is 6.0 m long: use 1.2e-5 m or more"),
         "{error}"
     );
 }
