@@ -10,6 +10,9 @@ const PLANE_POINTS: i64 = 6;
 const PLANE_FLATNESS: f64 = 0.1;
 /// Standard deviation of a return about a plane: noise of ranges and of poses, metres.
 const PLANE_NOISE_M: f64 = 0.03;
+/// Smallest standard deviation of a plane's points in both of its directions, metres: returns of one beam lie on a line
+/// as wide as their noise, and the plane through it is turned at random.
+const LEAST_WIDTH_M: f64 = 2.0 * PLANE_NOISE_M;
 /// Information along a plane, as a part of that of a point: where in the plane a centroid lies says little.
 const ALONG_PLANE: f64 = 0.05;
 
@@ -17,7 +20,8 @@ const ALONG_PLANE: f64 = 0.05;
 #[derive(Clone, Debug)]
 pub(super) struct Plane {
     pub normal: Vector3<f64>,
-    /// Covariance of the normal: of a plane fitted to `n` points, `λ0 / ((n - 3) λ)` along each axis in the plane.
+    /// Covariance of the normal: of a plane fitted to `n` points, `(λ0 + ε²) / ((n - 3) λ)` along each axis in the
+    /// plane. `ε` keeps a few points that lie in a plane by chance from a certain normal.
     pub tilt: Matrix3<f64>,
 }
 
@@ -55,12 +59,12 @@ impl Surface {
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
         let [l0, l1, l2] = order.map(|i| eigen.eigenvalues[i].max(0.0));
         let [v0, v1, v2] = order.map(|i| eigen.eigenvectors.column(i).into_owned());
-        if l0 < PLANE_FLATNESS * l1 {
-            let across = 1.0 / (l0 + PLANE_NOISE_M * PLANE_NOISE_M);
+        if l0 < PLANE_FLATNESS * l1 && l1 > LEAST_WIDTH_M * LEAST_WIDTH_M {
+            let across_m2 = l0 + PLANE_NOISE_M * PLANE_NOISE_M;
             let normal = v0 * v0.transpose();
             let along = ALONG_PLANE * isotropic(side_m);
-            self.information = normal * across + (Matrix3::identity() - normal) * along;
-            let thickness = l0 / (moments.count() - 3) as f64;
+            self.information = normal / across_m2 + (Matrix3::identity() - normal) * along;
+            let thickness = across_m2 / (moments.count() - 3) as f64;
             let tilt =
                 v1 * v1.transpose() * (thickness / l1) + v2 * v2.transpose() * (thickness / l2);
             self.plane = Some(Plane { normal: v0, tilt });
