@@ -1,7 +1,7 @@
 //! Registration of a scan with the map: Gauss-Newton on SE(3), from points to planes or points.
 
 use nalgebra::{
-    Cholesky, Isometry3, Matrix3, Matrix6, SymmetricEigen, UnitQuaternion, Vector3, Vector6,
+    Cholesky, Isometry3, Matrix3, Matrix6, Point3, SymmetricEigen, UnitQuaternion, Vector3, Vector6,
 };
 use rayon::prelude::*;
 
@@ -14,6 +14,8 @@ const MAX_ITERATIONS: usize = 30;
 /// Steps below these end the iterations.
 const DONE_M: f64 = 1e-3;
 const DONE_RAD: f64 = 1e-4;
+/// Neighbouring points whose costs are added before they are compared: they lie in one cell.
+const GROUP: usize = 8;
 /// Scale of the Geman-McClure kernel on the Mahalanobis distance.
 const KERNEL: f64 = 3.0;
 
@@ -101,6 +103,57 @@ pub(super) fn align(
         geometry: end.geometry,
         overlap: end.weight / count,
     }
+}
+
+/// Standard deviations by which the planes of the map explain points (base frame, metres) better at a pose than at that
+/// pose moved by a motion, and by its opposite: the smaller of the two.
+///
+/// Only points that lie on planes at both poses are compared. Where the map does not show the motion, differences of the
+/// costs are negative as often as positive. Their spread is therefore taken from the negative ones.
+pub(super) fn contrast(
+    map: &MomentMap,
+    points_m: &[Vector3<f64>],
+    pose: &Isometry3<f64>,
+    motion: &Vector6<f64>,
+    gate_m: f64,
+) -> f64 {
+    let moved = [perturbed(pose, motion), perturbed(pose, &-motion)];
+    let cost = |pose: &Isometry3<f64>, point: &Vector3<f64>| {
+        plane_cost(map, &(pose * Point3::from(*point)).coords, gate_m)
+    };
+    let groups: Vec<[f64; 2]> = points_m
+        .par_chunks(GROUP)
+        .map(|points| {
+            let mut worse = [0.0; 2];
+            for point in points {
+                let Some(here) = cost(pose, point) else {
+                    continue;
+                };
+                for (worse, other) in worse.iter_mut().zip(&moved) {
+                    *worse += cost(other, point).map_or(0.0, |there| there - here);
+                }
+            }
+            worse
+        })
+        .collect();
+    let deviations = [0, 1].map(|side| {
+        let worse = groups.iter().map(|group| group[side]);
+        let sum: f64 = worse.clone().sum();
+        let negative: f64 = worse.map(|worse| worse.min(0.0).powi(2)).sum();
+        // One more for a scan without negative ones.
+        sum / (1.0 + 2.0 * negative).sqrt()
+    });
+    deviations[0].min(deviations[1])
+}
+
+/// Robust cost of a point by its distance from the plane of its cell; `None` without a plane.
+fn plane_cost(map: &MomentMap, moved: &Vector3<f64>, gate_m: f64) -> Option<f64> {
+    let surface = map.nearest(moved, gate_m)?;
+    let plane = surface.plane.as_ref()?;
+    let off = moved - surface.mean_m;
+    let variance_m2 = plane.across_m2 + off.dot(&(plane.tilt * off));
+    let square = plane.normal.dot(&off).powi(2) / variance_m2;
+    Some(KERNEL * KERNEL * square / (KERNEL * KERNEL + square))
 }
 
 /// A pose moved by (translation, rotation) in the axes of the map about the base.
@@ -209,33 +262,36 @@ impl Held {
 }
 
 impl Geometry {
-    /// Motions that are observed in less than a part of the displacements that they make, weakest first, and the part of
-    /// the weakest of all motions.
+    /// Six independent motions with the part of the displacements that planes show, weakest first.
     ///
     /// Eigenvectors of `observed` relative to `displaced`.
-    pub fn weak(&self, least: f64) -> (Vec<WeakDirection>, f64) {
+    pub fn directions(&self) -> Vec<WeakDirection> {
         let unit = self.displaced / (self.displaced.trace() / 6.0).max(f64::MIN_POSITIVE);
         let Some(factor) = Cholesky::new(unit).and(Cholesky::new(self.displaced)) else {
             let all = (0..6).map(|i| WeakDirection {
                 motion: Vector6::from_fn(|row, _| f64::from(u8::from(row == i))),
                 part: 0.0,
             });
-            return (all.collect(), 0.0);
+            return all.collect();
         };
         let lower = factor.l();
         let Some(inverse) = lower.try_inverse() else {
-            return (Vec::new(), 0.0);
+            return Vec::new();
         };
         let eigen = SymmetricEigen::new(inverse * self.observed * inverse.transpose());
-        let mut weak: Vec<WeakDirection> = (0..6)
+        let mut directions: Vec<WeakDirection> = (0..6)
             .map(|i| WeakDirection {
                 motion: inverse.transpose() * eigen.eigenvectors.column(i),
                 part: eigen.eigenvalues[i],
             })
-            .filter(|weak| weak.part < least)
             .collect();
-        weak.sort_by(|a, b| a.part.total_cmp(&b.part));
-        (weak, eigen.eigenvalues.min())
+        directions.sort_by(|a, b| a.part.total_cmp(&b.part));
+        directions
+    }
+
+    /// Factor that makes a motion of [`Geometry::directions`] one of 1 m in the root mean square over points.
+    pub fn per_meter(&self) -> f64 {
+        self.displaced[(0, 0)].max(0.0).sqrt()
     }
 
     /// Holds directions that are weak here.

@@ -28,9 +28,10 @@ pub use verdict::{LostCause, Verdict, WeakDirection};
 
 use crate::cloud::NO_TIME_NS;
 use crate::lattice::{LatticeError, LatticeKind};
+use align::Held;
 use submap::Submap;
 use sweep::Sweep;
-use verdict::{Evidence, can_begin, judge, weak_part};
+use verdict::{Evidence, can_begin, judge, least_contrast};
 
 /// Registrations of a scan, each deskewed by the velocity that the one before found: usually, and where the map explains
 /// less of it than usual.
@@ -97,8 +98,9 @@ pub struct ScanResult {
     pub overlap: f64,
     /// Points that were registered.
     pub points: usize,
-    /// Part of the displacement of points by the weakest motion that planes show.
-    pub weakest: f64,
+    /// Standard deviations by which the map explains the scan better than at a cell's side from its pose, in the weakest
+    /// direction.
+    pub contrast: f64,
 }
 
 impl ScanResult {
@@ -117,7 +119,6 @@ impl ScanResult {
 pub struct Odometry {
     options: OdometryOptions,
     submap: Option<Submap>,
-    submaps: u32,
 }
 
 impl Odometry {
@@ -126,7 +127,6 @@ impl Odometry {
         Odometry {
             options,
             submap: None,
-            submaps: 0,
         }
     }
 
@@ -153,7 +153,10 @@ impl Odometry {
             let sweep = Sweep::new(first_ns, end_ns, &velocity, prior.rates);
             let points_m = sweep.deskew(scan.points_m, scan.times_ns);
             let sample = submap.sizes.sample(&points_m, kind)?;
-            let alignment = submap.align_around(&sample, &found);
+            let alignment = match pass {
+                1 => submap.align_around(&sample, &found),
+                _ => submap.align(&sample, &found, &Held::default()),
+            };
             let is_usual = !submap.is_suspicious(&alignment);
             if pass >= if is_usual { PASSES.0 } else { PASSES.1 } {
                 break (sample, alignment);
@@ -165,7 +168,8 @@ impl Odometry {
         };
 
         // Leave what the map does not show to the prediction.
-        let (weak, weakest) = alignment.geometry.weak(weak_part(was_lost));
+        let (weak, contrast) =
+            submap.weak_directions(&sample, &alignment, least_contrast(was_lost));
         let alignment = match weak.is_empty() {
             true => alignment,
             false => submap.align(&sample, &guess, &alignment.geometry.hold(&weak)),
@@ -181,11 +185,12 @@ impl Odometry {
             overlap: alignment.overlap,
             usual_overlap: submap.usual_overlap,
             was_lost,
+            is_one_place: submap.is_one_place(&alignment.map_from_base),
             weak,
             weak_m,
         });
         let result = submap.follow((first_ns, end_ns), &sample, &alignment, &guess, verdict);
-        Ok(ScanResult { weakest, ..result })
+        Ok(ScanResult { contrast, ..result })
     }
 
     /// Begins a submap with a scan, where the motion of the one before leads.
@@ -198,6 +203,12 @@ impl Odometry {
             .map_or_else(Isometry3::identity, |before| {
                 before.odom_from_base * before.motion.predict(before.end_ns, end_ns, prior)
             });
+        // A map of which no pose was certain is replaced.
+        let number = match &self.submap {
+            Some(before) if before.only_place_m.is_some() => before.number,
+            Some(before) => before.number + 1,
+            None => 0,
+        };
         let sizes = Sizes::of(scan.points_m, kind)?;
         let sample = sizes.sample(scan.points_m, kind)?;
         let mut result = ScanResult {
@@ -207,19 +218,19 @@ impl Odometry {
             odom_from_base,
             covariance: Matrix6::zeros(),
             verdict: Verdict::Lost(LostCause::FewPoints),
-            submap: self.submaps,
+            submap: number,
             overlap: 0.0,
             points: sample.registered_m.len(),
-            weakest: 0.0,
+            contrast: 0.0,
         };
         if !can_begin(sample.registered_m.len()) {
             return Ok(result);
         }
-        let mut submap = Submap::new(self.submaps, scan, sizes, kind, odom_from_base)?;
+        let mut submap = Submap::new(number, scan, sizes, kind, odom_from_base)?;
         submap.grow(&sample);
-        self.submaps += 1;
         self.submap = Some(submap);
-        (result.verdict, result.overlap, result.weakest) = (Verdict::Ok, 1.0, 1.0);
+        result.verdict = Verdict::Lost(LostCause::OnePlace);
+        (result.overlap, result.contrast) = (1.0, f64::INFINITY);
         Ok(result)
     }
 

@@ -10,8 +10,9 @@ use crate::lattice::{Lattice, LatticeError, LatticeKind};
 /// Side of the map's cells in mean distances of the returns of a scan: beams lie two to four times that apart, and a
 /// plane needs returns of more than one.
 const SIDE_SPACINGS: f64 = 8.0;
-/// Bounds of the side, metres: below, noise of ranges makes planes thick; above, cells hold several surfaces.
-const SIDES_M: (f64, f64) = (0.3, 1.0);
+/// Bounds of the side, metres: below, noise of ranges makes planes thick; above, cells hold several surfaces. With 1.5 m
+/// for 1 m at most, twice as many points of a street with moving cars lie on planes across it.
+const SIDES_M: (f64, f64) = (0.3, 1.5);
 /// Centroids for the map, at least and at most: a cell of the map gets some of each scan.
 const CENTROIDS: (usize, usize) = (3000, 8000);
 /// Points for registration, at least and at most.

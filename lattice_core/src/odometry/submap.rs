@@ -2,12 +2,12 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 
-use super::align::{Alignment, Held, align};
+use super::align::{Alignment, Held, align, contrast};
 use super::moment_map::MomentMap;
 use super::motion::{Motion, carried, seconds};
 use super::sampling::{Sample, Sizes};
 use super::sweep::Sweep;
-use super::verdict::{self, Verdict};
+use super::verdict::{self, LostCause, Verdict, WeakDirection};
 use super::{Scan, ScanResult};
 use crate::lattice::{Lattice, LatticeError, LatticeKind};
 
@@ -17,6 +17,9 @@ const MAX_CELLS: usize = 500_000;
 const KEPT_RANGES: f64 = 1.5;
 /// Scans of a new map that are added wherever the base is.
 const FIRST_SCANS: usize = 5;
+/// Distance from the place of a new map at which its verdicts count, metres: the first poses of a map lie within some
+/// centimetres where motion is not seen.
+const LEAVE_M: f64 = 0.3;
 /// Time between scans beyond which motion cannot be predicted, in seconds.
 const MAX_GAP_S: f64 = 0.5;
 /// Time for which a lost scan is looked for in the map before a new submap begins, in seconds.
@@ -31,6 +34,8 @@ const NEWEST: f64 = 0.1;
 const CORRELATION: f64 = 100.0;
 /// Error that all surfaces of a map share, metres: as measured in simulated drives.
 const SURFACE_ERROR_M: f64 = 0.005;
+/// Part of the deviation from constant velocity that remains in the pose of a scan: it was deskewed by a constant one.
+const DESKEW_ERROR: f64 = 0.5;
 
 /// The map of the scans before and the motion in it.
 #[derive(Clone)]
@@ -47,6 +52,8 @@ pub(super) struct Submap {
     pub scans: usize,
     /// Pose of the scan added last.
     pub added_at: Isometry3<f64>,
+    /// Place of the first scan until the machine has left it, metres.
+    pub only_place_m: Option<Vector3<f64>>,
     pub lost_since_ns: Option<i64>,
     /// The first scan while it is the whole map.
     pub first: Option<FirstScan>,
@@ -84,6 +91,7 @@ impl Submap {
             usual_overlap: FIRST_OVERLAP,
             scans: 0,
             added_at: odom_from_base,
+            only_place_m: Some(odom_from_base.translation.vector),
             lost_since_ns: None,
             first: scan.times_ns.map(|times_ns| FirstScan {
                 points_m: scan.points_m.to_vec(),
@@ -91,6 +99,38 @@ impl Submap {
                 span_ns,
             }),
         })
+    }
+
+    /// True if a pose is at the only place from which the map was seen.
+    pub fn is_one_place(&self, pose: &Isometry3<f64>) -> bool {
+        let is_near = |place: Vector3<f64>| (pose.translation.vector - place).norm() < LEAVE_M;
+        self.only_place_m.is_some_and(is_near)
+    }
+
+    /// Directions of motion in which the map does not tell the pose of a scan from one a cell away, weakest first, and the
+    /// least contrast of those tried.
+    pub fn weak_directions(
+        &self,
+        sample: &Sample,
+        alignment: &Alignment,
+        least: f64,
+    ) -> (Vec<WeakDirection>, f64) {
+        let shift = self.sizes.map_m * alignment.geometry.per_meter();
+        let directions = alignment.geometry.directions().into_iter().enumerate();
+        let tried = directions.filter(|(place, direction)| direction.is_tried(*place));
+        let with_contrast = tried.map(|(_, direction)| {
+            let (points, motion) = (&sample.registered_m, direction.motion * shift);
+            let (pose, gate_m) = (&alignment.map_from_base, self.motion.gate_m());
+            (
+                contrast(&self.map, points, pose, &motion, gate_m),
+                direction,
+            )
+        });
+        let all: Vec<(f64, WeakDirection)> = with_contrast.collect();
+        let smallest = all.iter().map(|(contrast, _)| *contrast);
+        let smallest = smallest.fold(f64::INFINITY, f64::min);
+        let weak = all.into_iter().filter(|(contrast, _)| *contrast < least);
+        (weak.map(|(_, direction)| direction).collect(), smallest)
     }
 
     /// True if the scan before was lost, or so long ago that motion cannot be predicted.
@@ -181,14 +221,22 @@ impl Submap {
         verdict: Verdict,
     ) -> ScanResult {
         let before = self.odom_from_base;
-        let is_lost = matches!(verdict, Verdict::Lost(_));
+        // At its first place a map is followed and filled, though nothing is said of its poses.
+        let is_one_place = verdict == Verdict::Lost(LostCause::OnePlace);
+        let is_lost = matches!(verdict, Verdict::Lost(_)) && !is_one_place;
         self.odom_from_base = match is_lost {
             true => *guess,
             false => alignment.map_from_base,
         };
         let displacement = self.odom_from_base.translation.vector - before.translation.vector;
         self.covariance = carried(&self.covariance, &displacement);
-        let registration = covariance_of(alignment, self.motion.weak_m(), &verdict, sample.arm_m);
+        let deviation = match self.motion.is_unknown() {
+            true => Vector6::zeros(),
+            false => between(guess, &alignment.map_from_base) * DESKEW_ERROR,
+        };
+        let mut registration =
+            covariance_of(alignment, self.motion.weak_m(), &verdict, sample.arm_m);
+        registration += deviation * deviation.transpose();
         let span_s = seconds(self.end_ns, end_ns);
         if is_lost {
             self.lost_since_ns.get_or_insert(end_ns);
@@ -200,16 +248,21 @@ impl Submap {
             self.motion.update(&found, &predicted, span_s, sample.arm_m);
             self.lost_since_ns = None;
         }
-        if verdict == Verdict::Ok {
+        if is_one_place {
             self.first = None;
+        }
+        if (is_one_place || verdict == Verdict::Ok)
+            && (self.is_elsewhere(sample.arm_m) || self.scans < FIRST_SCANS)
+        {
+            self.grow(sample);
+        }
+        if verdict == Verdict::Ok {
+            (self.first, self.only_place_m) = (None, None);
             self.motion.end_weak();
             self.usual_overlap += NEWEST * (alignment.overlap - self.usual_overlap);
             // As the base moves by the range of its points, the map is replaced, with the error of one registration.
             let replaced = (displacement.norm() / sample.arm_m).min(1.0);
             self.covariance += registration * replaced;
-            if self.is_elsewhere(sample.arm_m) || self.scans < FIRST_SCANS {
-                self.grow(sample);
-            }
         }
         self.end_ns = end_ns;
         self.sizes.follow(sample);
@@ -224,7 +277,7 @@ impl Submap {
             submap: self.number,
             overlap: alignment.overlap,
             points: sample.registered_m.len(),
-            weakest: 0.0,
+            contrast: 0.0,
         }
     }
 
@@ -252,6 +305,13 @@ impl Submap {
         self.added_at = pose;
         self.scans += 1;
     }
+}
+
+/// Motion (translation, rotation) in the axes of the map about the base that leads from a pose to another.
+fn between(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
+    let moved = to.translation.vector - from.translation.vector;
+    let turned = (to.rotation * from.rotation.inverse()).scaled_axis();
+    Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z)
 }
 
 /// Covariance of one registration; along weak directions that of the prediction.

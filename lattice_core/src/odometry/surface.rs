@@ -11,8 +11,9 @@ const PLANE_FLATNESS: f64 = 0.1;
 /// Standard deviation of a return about a plane: noise of ranges and of poses, metres.
 const PLANE_NOISE_M: f64 = 0.03;
 /// Smallest standard deviation of a plane's points in both of its directions, metres: returns of one beam lie on a line
-/// as wide as their noise, and the plane through it is turned at random.
-const LEAST_WIDTH_M: f64 = 2.0 * PLANE_NOISE_M;
+/// as wide as their noise, and the plane through it is turned at random. Twice as much leaves out recesses of 0.15 m, by
+/// which a corridor shows motion along it.
+const LEAST_WIDTH_M: f64 = PLANE_NOISE_M;
 /// Information along a plane, as a part of that of a point: where in the plane a centroid lies says little.
 const ALONG_PLANE: f64 = 0.05;
 
@@ -20,6 +21,8 @@ const ALONG_PLANE: f64 = 0.05;
 #[derive(Clone, Debug)]
 pub(super) struct Plane {
     pub normal: Vector3<f64>,
+    /// Variance of a return across the plane, m^2.
+    pub across_m2: f64,
     /// Covariance of the normal: of a plane fitted to `n` points, `(λ0 + ε²) / ((n - 3) λ)` along each axis in the
     /// plane. `ε` keeps a few points that lie in a plane by chance from a certain normal.
     pub tilt: Matrix3<f64>,
@@ -67,7 +70,11 @@ impl Surface {
             let thickness = across_m2 / (moments.count() - 3) as f64;
             let tilt =
                 v1 * v1.transpose() * (thickness / l1) + v2 * v2.transpose() * (thickness / l2);
-            self.plane = Some(Plane { normal: v0, tilt });
+            self.plane = Some(Plane {
+                normal: v0,
+                across_m2,
+                tilt,
+            });
         }
         self
     }

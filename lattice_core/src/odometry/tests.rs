@@ -139,10 +139,14 @@ fn error_m((result, truth): &(ScanResult, Isometry3<f64>)) -> f64 {
 fn a_loop_in_a_room_closes_to_centimetres() {
     let results = drive(&room(), loop_at, 215);
     let worst = results.iter().map(error_m).fold(0.0, f64::max);
+    // 1.2 m/s leave the first place in three scans.
+    let verdicts = results.iter().map(|(result, _)| &result.verdict);
+    let not_ok: Vec<_> = verdicts.filter(|v| **v != Verdict::Ok).collect();
+    assert!(not_ok.len() <= 3, "{not_ok:?}");
     assert!(
-        results
+        not_ok
             .iter()
-            .all(|(result, _)| result.verdict == Verdict::Ok)
+            .all(|v| **v == Verdict::Lost(LostCause::OnePlace))
     );
     assert!(worst < 0.05, "{worst} m");
 }
@@ -151,12 +155,8 @@ fn a_loop_in_a_room_closes_to_centimetres() {
 fn a_tunnel_without_features_is_not_ok() {
     let along = |seconds: f64| Isometry3::translation(seconds * 8.0, 0.3, 1.7);
     let results = drive(&tunnel(), along, 60);
-    let mut begun = None;
     for (result, _) in &results {
-        // The first scan of a submap is where it is by definition.
-        if begun.replace(result.submap) == Some(result.submap) {
-            assert!(result.verdict != Verdict::Ok, "{result:?}");
-        }
+        assert!(result.verdict != Verdict::Ok, "{result:?}");
     }
 }
 
@@ -186,6 +186,9 @@ fn a_blank_sensor_is_lost_and_found_again_in_the_same_map() {
             stamp_ns: end_ns,
         };
         let result = odometry.register(&scan, &Prior::default()).unwrap();
+        if i <= 3 {
+            continue;
+        }
         let few = Verdict::Lost(LostCause::FewPoints);
         assert_eq!(result.verdict == few, is_blank, "{i}: {result:?}");
         assert!(is_blank || result.verdict == Verdict::Ok, "{i}: {result:?}");

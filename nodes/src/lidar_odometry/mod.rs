@@ -45,6 +45,8 @@ pub struct OdometryCounts {
     pub lost_no_overlap: u64,
     /// Poses that are predicted: the surfaces in view do not show the motion.
     pub lost_unobservable: u64,
+    /// Poses without a verdict: the machine has not left the place where the map began.
+    pub lost_one_place: u64,
     /// Dropped: the bytes are not what the header says, or no usable per-point time.
     pub clouds_malformed: u64,
     /// Dropped: no transform from the frame of the machine to that of the cloud.
@@ -60,7 +62,7 @@ pub struct OdometryCounts {
 impl OdometryCounts {
     /// Poses that are predictions, for whichever reason.
     pub fn scans_lost(&self) -> u64 {
-        self.lost_few_points + self.lost_no_overlap + self.lost_unobservable
+        self.lost_few_points + self.lost_no_overlap + self.lost_unobservable + self.lost_one_place
     }
 }
 
@@ -222,6 +224,7 @@ impl LidarOdometry {
             Verdict::Lost(LostCause::FewPoints) => &mut counts.lost_few_points,
             Verdict::Lost(LostCause::NoOverlap) => &mut counts.lost_no_overlap,
             Verdict::Lost(LostCause::Unobservable) => &mut counts.lost_unobservable,
+            Verdict::Lost(LostCause::OnePlace) => &mut counts.lost_one_place,
         } += 1;
         let is_lost = matches!(result.verdict, Verdict::Lost(_));
         counts.submaps = counts

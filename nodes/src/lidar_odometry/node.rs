@@ -181,7 +181,7 @@ impl Shell {
         if let Some(result) = result {
             values.push(("submap".into(), result.submap.to_string()));
             values.push(("overlap".into(), format!("{:.3}", result.overlap)));
-            values.push(("weakest".into(), format!("{:.3}", result.weakest)));
+            values.push(("contrast".into(), format!("{:.1}", result.contrast)));
         }
         self.diagnostics.set("odometry", level, message, values);
     }

@@ -52,6 +52,10 @@ impl ScanPosesReport {
                 counts.lost_unobservable,
             ),
             (
+                "LOST: the machine has not moved by 0.3 m since its map began",
+                counts.lost_one_place,
+            ),
+            (
                 "in submaps whose place in the map is unknown, as nothing joins them",
                 self.scans_elsewhere,
             ),
@@ -70,10 +74,10 @@ impl ScanPosesReport {
         lost.chain(refused).collect()
     }
 
-    /// Cause for which no scan but the first ones of submaps has a pose.
+    /// Cause for which no scan has a pose that is certain.
     pub(super) fn cause_of_nothing(&self) -> Option<String> {
         let counts = &self.counts;
-        let all_lost = counts.clouds_in > 1 && counts.scans_ok <= counts.submaps;
+        let all_lost = counts.clouds_in > 0 && counts.scans_ok == 0;
         all_lost.then(|| {
             let losses = self.losses().join("; ");
             format!("all scans of {} are lost: {losses}", self.topic)
