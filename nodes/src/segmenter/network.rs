@@ -93,7 +93,7 @@ pub enum ModelError {
     Unusable {
         /// Path of the model.
         path: PathBuf,
-        /// What is wrong.
+        /// Fault of the network.
         problem: String,
     },
 }

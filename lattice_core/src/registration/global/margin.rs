@@ -62,7 +62,7 @@ impl Margin {
     /// Probability that the pose is wrong and an alternative is right.
     ///
     /// Log-odds grow with the square of the margin, limited by its distinct part. The constants are fitted to
-    /// simulated scenes and a room, see `docs/calibration.md`.
+    /// simulated scenes and a room, see `docs/decisions/0024-p-wrong.md`.
     pub fn p_wrong(&self) -> f64 {
         1.0 / (1.0 + (self.log_odds_over_one() - self.log_alternatives()).exp())
     }

@@ -55,7 +55,7 @@ const FINALISTS: usize = 4;
 /// Fraction of contradicted lines of sight above which a pose is in doubt; correct poses rarely reach it.
 const IN_DOUBT: f64 = 0.1;
 /// Largest log-ratio of two scales that count as equal.
-const ABOUT: f64 = 0.08;
+const SAME_SCALE_LOG_RATIO: f64 = 0.08;
 /// Maximum number of classes in the search by labels.
 const SEARCHED_CLASSES: usize = 24;
 
@@ -175,7 +175,7 @@ impl Calibration {
     /// Tests whether the estimated scale nearly equals `scale`.
     fn is_about(&self, scale: f64) -> bool {
         let estimate = self.scale.map_or(1.0, |estimate| estimate.scale);
-        (estimate / scale).ln().abs() < ABOUT
+        (estimate / scale).ln().abs() < SAME_SCALE_LOG_RATIO
     }
 }
 

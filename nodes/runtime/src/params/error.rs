@@ -32,7 +32,7 @@ pub enum ParamError {
         value: String,
         /// File, command line or default.
         origin: String,
-        /// What is wrong, and the allowed values.
+        /// Violated rule, with the allowed values.
         problem: String,
     },
     /// The node has no such parameter.

@@ -23,7 +23,7 @@ pub enum RosArgsError {
         flag: String,
         /// The value as given, escaped and shortened.
         argument: String,
-        /// What is wrong.
+        /// Violated rule of the grammar.
         problem: String,
         /// Expected form of the value.
         expected: &'static str,

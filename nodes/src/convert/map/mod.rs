@@ -34,7 +34,7 @@ pub enum MapMessageError {
         lattice: String,
         /// Cell volume as sent.
         cell_volume_m3: f64,
-        /// What is wrong.
+        /// Fault of the lattice or the volume.
         reason: String,
     },
     /// Unsupported key encoding.

@@ -33,7 +33,7 @@ pub enum PointFileError {
         format: PointFormat,
         /// Invalid line.
         line: u64,
-        /// What is wrong and what is expected.
+        /// Fault and expected content.
         reason: String,
     },
     /// Invalid binary data.
@@ -43,7 +43,7 @@ pub enum PointFileError {
         format: PointFormat,
         /// Position in the file.
         byte: u64,
-        /// What is wrong and what is expected.
+        /// Fault and expected content.
         reason: String,
     },
     /// Truncated file.

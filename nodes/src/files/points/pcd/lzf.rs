@@ -9,7 +9,7 @@
 pub(super) struct Corrupt {
     /// Start of the invalid item.
     pub(super) byte: usize,
-    /// What is wrong.
+    /// Fault of the compressed data.
     pub(super) reason: String,
 }
 
