@@ -5,6 +5,7 @@ pub mod cloud;
 pub mod geodesy;
 mod kd_tree;
 pub mod lattice;
+pub mod odometry;
 pub mod pose;
 mod prefetch;
 pub mod query;

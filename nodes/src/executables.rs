@@ -14,8 +14,8 @@ use crate::start::{Declare, NodeError, Start};
 #[cfg(feature = "viewer")]
 use crate::viewer_server;
 use crate::{
-    enu_transformer, lattice_mapper, map_merger, segmenter, semantic_cloud, semantic_icp_server,
-    voxel_marker_publisher,
+    enu_transformer, lattice_mapper, lidar_odometry, map_merger, segmenter, semantic_cloud,
+    semantic_icp_server, voxel_marker_publisher,
 };
 use lattice_runtime::Runtime;
 use lattice_runtime::logging;
@@ -28,6 +28,7 @@ pub const NODES: &[(&str, Start)] = &[
     ("semantic_cloud", semantic_cloud::node::start),
     #[cfg(feature = "headset")]
     ("headset_cloud", headset_cloud::node::start),
+    ("lidar_odometry", lidar_odometry::node::start),
     ("enu_transformer", enu_transformer::node::start),
     ("lattice_mapper", lattice_mapper::node::start),
     ("map_merger", map_merger::node::start),
@@ -46,6 +47,7 @@ pub const PARAMETERS: &[(&str, Declare)] = &[
     ("semantic_cloud", semantic_cloud::declare),
     #[cfg(feature = "headset")]
     ("headset_cloud", headset_cloud::declare),
+    ("lidar_odometry", lidar_odometry::declare),
     ("enu_transformer", enu_transformer::declare),
     ("lattice_mapper", lattice_mapper::declare),
     ("map_merger", map_merger::declare),

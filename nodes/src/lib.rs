@@ -14,6 +14,7 @@ pub mod files;
 #[cfg(feature = "headset")]
 pub mod headset_cloud;
 pub mod lattice_mapper;
+pub mod lidar_odometry;
 pub mod map_follower;
 mod map_input;
 pub mod map_merger;

@@ -22,7 +22,7 @@ pub struct CloudNote {
 
 /// Notes since the start.
 #[derive(Clone, Debug, Default)]
-pub(super) struct CloudNotes {
+pub(crate) struct CloudNotes {
     notes: Vec<CloudNote>,
     topics: Vec<TopicTimes>,
 }

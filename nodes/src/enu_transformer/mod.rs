@@ -4,6 +4,7 @@
 
 mod cloud_clocks;
 mod cloud_notes;
+mod cloud_times;
 mod counts;
 mod drops;
 mod fixes;
@@ -23,8 +24,11 @@ mod verdict;
 mod waiting;
 
 pub use cloud_notes::CloudNote;
+pub(crate) use cloud_notes::CloudNotes;
+pub(crate) use cloud_times::CloudTimes;
 pub use counts::{TransformerCounts, TransformerReport};
 pub use options::TransformerOptions;
+pub(crate) use options::time_options;
 pub use parameters::declare;
 pub use refusals::{Refusal, Refusals, most_frequent};
 pub(crate) use stamp_order::StampOrder;
@@ -43,7 +47,6 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use nalgebra::Isometry3;
 
 use self::cloud_clocks::CloudClocks;
-use self::cloud_notes::CloudNotes;
 use self::drops::Drop;
 use self::ins::{InsDecoder, InsMessage, InsSource};
 use self::link_orders::LinkOrders;
@@ -150,6 +153,11 @@ impl EnuTransformer {
             refusals: Refusals::default(),
             options,
         }
+    }
+
+    /// The options.
+    pub(crate) fn options(&self) -> &TransformerOptions {
+        &self.options
     }
 
     /// Goes on with other options, except for frames, INS, origin and what is kept of poses.

@@ -226,7 +226,8 @@ fn correction(params: &Params) -> Result<Option<Isometry3<f64>>, ParamError> {
     Ok(Some(correction).filter(|correction| *correction != Isometry3::identity()))
 }
 
-fn time_options(params: &Params) -> Result<TimeOptions, ParamError> {
+/// `time.*`: field, unit and reference of the times of points.
+pub(crate) fn time_options(params: &Params) -> Result<TimeOptions, ParamError> {
     let field = params.string("time.field", "")?;
     let units = [
         ("auto", None),

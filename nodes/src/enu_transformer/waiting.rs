@@ -3,12 +3,13 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use lattice_core::cloud::{CloudError, CloudLimits, NO_TIME_NS};
+use lattice_core::cloud::CloudError;
 use lattice_msgs::sensor_msgs::PointCloud2;
 
 use super::TransformerOptions;
 use super::cloud_clocks::CloudClock;
 use super::cloud_notes::CloudNotes;
+use super::cloud_times::CloudTimes;
 use crate::convert::cloud;
 
 /// A cloud whose layout has been checked, with the time of each point.
@@ -37,34 +38,15 @@ impl WaitingCloud {
         options: &TransformerOptions,
         notes: &mut CloudNotes,
     ) -> Result<Self, CloudError> {
-        let limits = CloudLimits {
-            max_points: options.max_cloud_points,
-        };
-        let stamp_ns = message.header.stamp.to_ns();
-        let (layout, mended) = cloud::mended_layout_of(&message);
-        notes.on_layout(topic, &mended);
-        let view = layout.view(&message.data, &limits)?;
-        let times = match options.deskew {
-            true => {
-                let found = view.point_times(stamp_ns, &options.time)?;
-                notes.on_times(topic, stamp_ns, &found.source);
-                found.times_ns
-            }
-            false => None,
-        };
-        let known = times.iter().flatten().filter(|t| **t != NO_TIME_NS);
-        let span = known.fold(None, |span, &t| {
-            let (first, last) = span.unwrap_or((t, t));
-            Some((t.min(first), t.max(last)))
-        });
-        let (first_ns, last_ns) = span.unwrap_or((stamp_ns, stamp_ns));
+        let time = options.deskew.then_some(&options.time);
+        let times = CloudTimes::read(topic, &message, options.max_cloud_points, time, notes)?;
         Ok(Self {
             topic: topic.into(),
             frame: message.header.frame_id.trim_start_matches('/').to_owned(),
-            stamp_ns,
-            times,
-            first_ns,
-            last_ns,
+            stamp_ns: times.stamp_ns,
+            times: times.times_ns,
+            first_ns: times.first_ns,
+            last_ns: times.last_ns,
             arrived_ns,
             clock: CloudClock::default(),
             message,

@@ -6,12 +6,14 @@ mod disorder;
 mod plan;
 mod poses;
 mod report;
+mod scan_poses;
 mod statics;
 mod survey;
 mod topics;
 
 pub use plan::{TopicPlan, TopicWishes, plan};
 pub use report::{LatticeReport, RunReport};
+pub use scan_poses::ScanPosesReport;
 pub use topics::{Role, TopicError};
 
 use std::sync::Arc;
@@ -31,13 +33,17 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use crate::enu_transformer::ins::InsMessage;
 use crate::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptions, TransformerReport};
 use crate::lattice_mapper::{LatticeMapper, MapperOptions, MapperReport};
+use crate::lidar_odometry::LidarOdometryOptions;
 use crate::voxel_marker_publisher::{MarkerOptions, MarkerReport, VoxelMarkers};
 use lattice_bag::{BagMessage, BagReader, ReadOptions};
+use scan_poses::ScanPoses;
 
 /// Epoch of maps that come from a replay: the same log gives the same bytes.
 const EPOCH: u64 = 1;
 /// Poses and transforms behind a slice that its last clouds may wait for.
 const POSES_BEHIND_NS: i64 = 10_000_000_000;
+/// Part of the progress that is of odometry, where poses come from it: it takes four fifths of the time.
+const ODOMETRY_PART: f64 = 0.8;
 /// Time between two updates of the map to its followers, in log time.
 const UPDATE_PERIOD_NS: i64 = 1_000_000_000;
 
@@ -122,10 +128,19 @@ impl Pipeline {
             origin: self
                 .origin
                 .map(|at| [at.latitude, at.longitude, at.altitude]),
+            odometry: None,
             implausible_rows: 0,
             cuts: Vec::new(),
             choices: Vec::new(),
             wall_s: 0.0,
+        }
+    }
+
+    /// Takes poses of lidar odometry.
+    fn on_scan_poses(&mut self, topic: &str, poses: &[Odometry], now_ns: i64) {
+        for pose in poses {
+            let outputs = (self.transformer).on_ins(topic, InsMessage::Odometry(pose), now_ns);
+            self.map(outputs);
         }
     }
 
@@ -285,6 +300,20 @@ pub fn run(
     if !plan.late_statics.transforms.is_empty() {
         pipeline.hold(&plan.late_statics, start_ns);
     }
+    let tell = &mut |log_time_ns: i64, from: f64, to: f64| {
+        let part = log_time_ns.saturating_sub(start_ns) as f64 / span_ns;
+        progress(from + (to - from) * part.clamp(0.0, 1.0));
+    };
+    let odometry = match plan.odometry {
+        Some(topic) => {
+            let options = LidarOdometryOptions::of(pipeline.transformer.options());
+            let end_ns = (!whole).then_some(to_ns);
+            let told = &mut |log_time_ns| tell(log_time_ns, 0.0, ODOMETRY_PART);
+            Some(ScanPoses::of(bag, plan, topic, options, end_ns, told)?)
+        }
+        None => None,
+    };
+    let mapping_from = odometry.as_ref().map_or(0.0, |_| ODOMETRY_PART);
     let passes = [(!whole).then_some(before), Some(within)];
     for options in passes.into_iter().flatten() {
         for message in bag.messages(&options)? {
@@ -295,9 +324,18 @@ pub fn run(
                 clouds += u64::from(role == Role::Cloud);
                 let topic = bag.topics().get(message.topic);
                 let topic = topic.map_or("", |topic| topic.name.as_str());
+                let of_scans = odometry
+                    .as_ref()
+                    .filter(|scans| scans.topic == message.topic);
+                if let Some(scans) = of_scans {
+                    let Some(poses) = scans.poses(message.log_time_ns) else {
+                        continue;
+                    };
+                    pipeline.on_scan_poses(topic, &poses, message.log_time_ns);
+                }
                 pipeline.on_message(topic, role, &message);
             }
-            progress(message.log_time_ns.saturating_sub(start_ns) as f64 / span_ns);
+            tell(message.log_time_ns, mapping_from, 1.0);
         }
     }
     Ok(RunReport {
@@ -306,6 +344,7 @@ pub fn run(
         implausible_rows: bag.implausible_rows(),
         cuts: bag.cuts(),
         choices: plan.choices.clone(),
+        odometry: odometry.map(|scans| scans.report),
         wall_s: begin.elapsed().as_secs_f64(),
         ..pipeline.finish()
     })

@@ -40,6 +40,8 @@ pub struct TopicPlan {
     pub map_frame: String,
     /// Frame of the machine.
     pub base_frame: String,
+    /// Cloud topic whose scans give the poses, by lidar odometry: the log has no others.
+    pub odometry: Option<usize>,
     /// Delay with which poses come late in the log, in nanoseconds.
     pub pose_delay_ns: i64,
     /// Static transforms that come after the first cloud, and hold from the beginning.
@@ -99,7 +101,10 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
     };
     let poses = log.poses()?;
     let map_frame = log.map_frame(&poses);
-    let chosen = log.chosen_clouds(&poses, &map_frame);
+    let chosen = match poses.odometry {
+        Some(topic) if wishes.points.is_empty() => vec![log.clouds_of(topic)],
+        _ => log.chosen_clouds(&poses, &map_frame),
+    };
     let mut roles = BTreeMap::new();
     roles.extend(chosen.into_iter().map(|topic| (topic, Role::Cloud)));
     roles.extend(
@@ -115,6 +120,7 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
         source: poses.source,
         map_frame,
         base_frame: poses.base_frame,
+        odometry: poses.odometry,
         pose_delay_ns: 0,
         late_statics: TFMessage::default(),
         choices: Vec::new(),
@@ -142,9 +148,14 @@ fn said(bag: &BagReader, plan: &TopicPlan) -> Vec<String> {
         }
     };
     let tf = names(|role| matches!(role, Role::Transforms(_)));
+    let scans = plan.odometry.and_then(|topic| bag.topics().get(topic));
     let poses = match plan.source {
         InsSource::Tf => tf.clone(),
         _ => names(|role| matches!(role, Role::Ins(_))),
+    };
+    let poses = match scans {
+        Some(scans) => format!("none in the log; lidar odometry on {}", scans.name),
+        None => poses,
     };
     let TopicPlan {
         source,
@@ -160,6 +171,18 @@ fn said(bag: &BagReader, plan: &TopicPlan) -> Vec<String> {
 }
 
 impl Log<'_> {
+    /// The topic of lidar odometry alone: while it is lost, other clouds have no place.
+    fn clouds_of(&mut self, topic: usize) -> usize {
+        let others = self.clouds.iter().filter(|cloud| cloud.topic != topic);
+        let lines = others.map(|cloud| {
+            let (name, taken) = (self.name(cloud.topic), self.name(topic));
+            format!("not taken: {name} (poses are those of {taken}; --points {taken} --points {name} takes both)")
+        });
+        let lines: Vec<String> = lines.collect();
+        self.choices.extend(lines);
+        topic
+    }
+
     /// The cloud topics to map: one for each frame of a sensor. Clouds of the machine's own frame, and of
     /// frames that are fixed in the world, are made of those of the sensors: they are taken where there
     /// are no others that transforms connect.

@@ -15,6 +15,8 @@ const SPARSE_HZ: f64 = 4.0;
 /// edge of a default cell, m.
 const MAX_CONTRADICTION_M: f64 = 0.1;
 const MAP: &str = "map";
+/// Frame of lidar odometry.
+const ODOM: &str = "odom";
 const BASE: &str = "base_link";
 
 /// Poses of the machine itself come first: they need no mount.
@@ -35,6 +37,8 @@ pub(super) struct Poses {
     /// Frame that they are in; empty where they name none, or are geodetic.
     pub frame: String,
     pub base_frame: String,
+    /// Cloud topic of lidar odometry, where the log has no poses.
+    pub odometry: Option<usize>,
 }
 
 /// Poses, and the reason for which others come before them.
@@ -123,10 +127,7 @@ impl Log<'_> {
             return Ok(tf);
         }
         if worse.is_empty() {
-            return Err(TopicError::NoIns {
-                base: self.known_base().unwrap_or_else(|| BASE.to_owned()),
-                has: listing(self.bag),
-            });
+            return Ok(self.of_scans());
         }
         // Refused by name, pose by pose.
         let (_, poses, _) = worse.remove(0);
@@ -189,6 +190,7 @@ impl Log<'_> {
                 topics,
                 frame,
                 base_frame: base.unwrap_or_else(|| BASE.to_owned()),
+                odometry: None,
             },
             match (unusable, connected) {
                 (Some(why), _) => Err(why.to_owned()),
@@ -237,6 +239,30 @@ impl Log<'_> {
         child.is_empty() || base.is_none_or(|base| self.tree.connects(base, child))
     }
 
+    /// Poses by lidar odometry, of the machine where transforms connect it with clouds, else of a sensor.
+    fn of_scans(&self) -> Poses {
+        let best = self.clouds.iter().max_by_key(|cloud| {
+            let is_carried = |base: &String| self.tree.connects(base, &cloud.frame);
+            let is_carried = self.known_base().is_some_and(|base| is_carried(&base));
+            (
+                is_carried,
+                self.count(cloud.topic),
+                std::cmp::Reverse(cloud.topic),
+            )
+        });
+        let (topic, frame) = best.map_or((None, ODOM), |best| (Some(best.topic), &best.frame));
+        let base = self
+            .known_base()
+            .filter(|base| self.tree.connects(base, frame));
+        Poses {
+            source: InsSource::Odometry,
+            topics: Vec::new(),
+            frame: ODOM.to_owned(),
+            base_frame: base.unwrap_or_else(|| self.tree.static_root(frame)),
+            odometry: topic,
+        }
+    }
+
     /// Poses by transforms alone, from a frame of the world to the machine.
     fn of_tf(&self) -> Option<Poses> {
         let in_tree = |frame: &str| self.tree.contains(frame).then(|| frame.to_owned());
@@ -262,6 +288,7 @@ impl Log<'_> {
                 topics: Vec::new(),
                 frame: map_frame,
                 base_frame,
+                odometry: None,
             })
     }
 

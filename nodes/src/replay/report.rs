@@ -5,6 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::ScanPosesReport;
 use crate::enu_transformer::{Refusal, TransformerReport};
 use crate::lattice_mapper::MapperReport;
 use crate::voxel_marker_publisher::MarkerReport;
@@ -39,6 +40,9 @@ pub struct RunReport {
     /// Latitude and longitude in degrees and ellipsoidal height in m of the map's origin, where known.
     #[serde(default)]
     pub origin: Option<[f64; 3]>,
+    /// Odometry of the scans, where the log has no poses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odometry: Option<ScanPosesReport>,
     /// Rows of the log that are no messages and were left out.
     #[serde(default)]
     pub implausible_rows: u64,
@@ -55,6 +59,10 @@ pub struct RunReport {
 impl RunReport {
     /// Fails with the cause unless some cloud was mapped in every lattice.
     pub fn check(&self) -> Result<(), NothingMapped> {
+        let lost = self.odometry.as_ref();
+        if let Some(cause) = lost.and_then(ScanPosesReport::cause_of_nothing) {
+            return Err(NothingMapped { cause });
+        }
         let is_empty = |report: &LatticeReport| report.map.voxels == 0;
         if !self.lattices.iter().any(is_empty) {
             return Ok(());
@@ -88,6 +96,8 @@ impl RunReport {
             + self.transformer.clouds_lost_on_network
             + self.transformer.undecodable;
         let arrived = counts.clouds_in + refused;
+        let odometry = self.odometry.as_ref();
+        let arrived = arrived + odometry.map_or(0, ScanPosesReport::left_out);
         let missing = self.clouds_in_log.saturating_sub(arrived);
         if missing > 0 {
             let all = self.clouds_in_log;
@@ -95,6 +105,7 @@ impl RunReport {
                 "{missing} of {all} clouds of the log did not reach the transformer"
             ));
         }
+        lines.extend(odometry.into_iter().flat_map(ScanPosesReport::losses));
         for (reason, count) in self.transformer.dropped() {
             lines.push(format!("{count} of {} clouds: {reason}", counts.clouds_in));
         }
@@ -177,6 +188,9 @@ impl fmt::Display for RunReport {
             counts.points_out_of_range,
             counts.points_no_time
         )?;
+        if let Some(odometry) = &self.odometry {
+            writeln!(f, "{odometry}")?;
+        }
         for note in self.transformer.notes.iter().filter(|note| note.is_warning) {
             writeln!(f, "note: {}: {}", note.topic, note.text)?;
         }
@@ -237,6 +251,7 @@ mod tests {
                 markers: MarkerReport::default(),
             }],
             origin: None,
+            odometry: None,
             implausible_rows: 0,
             cuts: Vec::new(),
             choices: Vec::new(),

@@ -34,16 +34,6 @@ pub enum TopicError {
         /// Topics of the log.
         has: String,
     },
-    /// No poses.
-    #[error(
-        "no poses in the log: a map needs Odometry, INSPVAX, INSPVA, NavSatFix with Imu, PoseStamped, PoseWithCovarianceStamped, or /tf from a fixed frame to {base}; record one of them, or run a lidar odometry (KISS-ICP, FAST-LIO) on the log and record what it publishes beside the clouds. The log has {has}"
-    )]
-    NoIns {
-        /// Frame of the machine.
-        base: String,
-        /// Topics of the log.
-        has: String,
-    },
     /// Clouds of several robots.
     #[error("clouds of several robots: {robots}; choose those of one with --points TOPIC")]
     Robots {

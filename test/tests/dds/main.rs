@@ -13,6 +13,7 @@ mod machines;
 mod markers;
 mod network;
 mod octomap;
+mod odometry;
 mod params;
 mod rclpy;
 mod rgbd;

@@ -30,6 +30,7 @@ fn nodes() -> impl Iterator<Item = (&'static str, &'static str, Params)> {
             "segmenter" => "segmenter.yaml",
             "semantic_cloud" => "rgbd.yaml",
             "headset_cloud" => "headset.yaml",
+            "lidar_odometry" => "lidar_odometry.yaml",
             "map_merger" => "map_merger.yaml",
             "semantic_icp_server" => "semantic_icp.yaml",
             "viewer_server" => "viewer.yaml",

@@ -3,6 +3,7 @@
 use super::evaluate_chain::Chain;
 use super::evaluate_kitti::Kitti;
 use super::evaluate_many::{Many, Reliability};
+use super::evaluate_odometry::OfDrives;
 use super::evaluate_scans::OfScans;
 use super::{Choice, choice, processors};
 use crate::progress::Progress;
@@ -36,6 +37,8 @@ pub enum Evaluate {
     Scans(Box<OfScans>),
     /// Compare what verdicts of other evaluations stated with what was observed
     Reliability(Reliability),
+    /// Drive a lidar through simulated scenes, with motion during each scan, and register its scans: drift and verdicts
+    Odometry(OfDrives),
     /// Register real labelled laser scans with each method, against the truth of an INS
     Kitti(Kitti),
 }
@@ -132,6 +135,7 @@ impl Evaluate {
             Self::Town(command) => command.town(),
             Self::Scans(command) => command.run(),
             Self::Reliability(command) => command.run(),
+            Self::Odometry(command) => command.run(),
             Self::Kitti(command) => command.run(),
         }
     }

@@ -10,6 +10,7 @@ mod evaluate;
 mod evaluate_chain;
 mod evaluate_kitti;
 mod evaluate_many;
+mod evaluate_odometry;
 mod evaluate_scans;
 mod paper;
 mod simulate;

@@ -139,6 +139,12 @@ impl Replay {
         }
         let bag = BagReader::open(&self.bag)?.past_cut();
         let plan = self.plan(&bag)?;
+        if plan.odometry.is_some() {
+            eprintln!(
+                "replayed directly (--direct), as poses come from lidar odometry over the whole log"
+            );
+            return self.replay_planned(&bag, &plan);
+        }
         let lattices: Vec<_> = self.maps()?.into_iter().map(|map| map.lattice).collect();
         if lattices.len() > MAX_LOOPBACK_LATTICES {
             let count = lattices.len();
@@ -162,6 +168,10 @@ impl Replay {
     fn replay_direct(&self) -> CliResult<RunReport> {
         let bag = BagReader::open(&self.bag)?.past_cut();
         let plan = self.plan(&bag)?;
+        self.replay_planned(&bag, &plan)
+    }
+
+    fn replay_planned(&self, bag: &BagReader, plan: &TopicPlan) -> CliResult<RunReport> {
         let mut transformer = TransformerOptions::from_params(&self.params_of("enu_transformer")?)?;
         transformer.ins.source = plan.source;
         transformer.map_frame.clone_from(&plan.map_frame);
@@ -181,7 +191,7 @@ impl Replay {
         let source = self.bag.display().to_string();
         let report = pool.install(|| {
             let tell = &mut |done| progress.set(done);
-            replay::run(&bag, &plan, &self.slice(), &mut pipeline, &source, tell)
+            replay::run(bag, plan, &self.slice(), &mut pipeline, &source, tell)
         })?;
         progress.done();
         if let Some(path) = &self.map_out {

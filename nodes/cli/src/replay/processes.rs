@@ -87,6 +87,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
         transformer,
         lattices: lattices.into_values().collect(),
         origin: None,
+        odometry: None,
         implausible_rows: replay.reader.implausible_rows(),
         cuts: replay.reader.cuts(),
         choices: replay.plan.choices.clone(),

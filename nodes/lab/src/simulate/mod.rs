@@ -11,6 +11,7 @@
 //! middle of the site; `base_link` is forward, left, up on the ground in the middle of the wheels.
 
 mod bobcat;
+pub mod drive;
 mod ground;
 mod height_field;
 pub mod house;

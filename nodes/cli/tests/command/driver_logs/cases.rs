@@ -206,8 +206,6 @@ const MAST: &str = "ins.lever_arm_m:=[0.0, 0.0, 0.7937005259840998]";
 
 fn faults() -> Vec<Case> {
     vec![
-        mcap("lidar_alone").refused(&["no poses"]),
-        sqlite3("lidar_and_imu").refused(&["no poses"]),
         mcap("livox_own_messages").refused(&["/livox/lidar", "livox_ros_driver2/msg/CustomMsg"]),
         sqlite3("gazebo_scoped_frame").refused(&["no transform base_link <- x500/lidar_link"]),
         mcap("lidar_without_mount")

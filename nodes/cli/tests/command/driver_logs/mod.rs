@@ -117,6 +117,28 @@ fn check_all(cases: &[Case], check: impl Fn(&Case) -> Result<(), String>) {
 }
 
 #[test]
+fn a_lidar_without_poses_is_mapped_by_its_odometry() {
+    let folder = tempfile::tempdir().unwrap();
+    let logs = [cases::mcap("lidar_alone"), cases::sqlite3("lidar_and_imu")];
+    let Some(_) = Made::of(&logs, folder.path()) else {
+        return;
+    };
+    for log in logs {
+        let case = log.says(&["none in the log; lidar odometry on", "replayed directly"]);
+        let report = replay(&case, folder.path(), &[]).unwrap().unwrap();
+        let counts = &report["odometry"]["counts"];
+        assert_eq!(counts["scans_ok"], 30, "{report:#}");
+        // The machine of the logs moves by 3.6 m in their 3 s.
+        let path_m = counts["path_m"].as_f64().unwrap();
+        assert!((3.0..5.0).contains(&path_m), "{path_m} m");
+        assert_eq!(
+            report["transformer"]["counts"]["clouds_out"], 30,
+            "{report:#}"
+        );
+    }
+}
+
+#[test]
 fn logs_of_drivers_give_the_reference_map_or_say_what_is_missing() {
     let directory = tempfile::tempdir().unwrap();
     let folder = directory.path();

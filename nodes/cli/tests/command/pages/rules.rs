@@ -168,6 +168,8 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     ),
     ("docs/octomap.md", "lattice map export", Runs("")),
     ("docs/octomap.md", "lattice quantize map.bt", Runs("")),
+    ("docs/odometry.md", "lattice replay LOG", Runs("--direct")),
+    ("docs/odometry.md", "lattice run", Works("lidar_odometry")),
     ("docs/odd_logs.md", "lattice replay LOG --direct", Runs("")),
     ("docs/poses.md", "lattice bag info LOG", Runs("")),
     ("docs/poses.md", "lattice replay LOG --direct", Runs("")),

@@ -3,7 +3,7 @@
 //!
 //! The frame of the town has x along the street and z up, metres. Everything depends on a seed alone.
 
-mod solid;
+pub(in crate::simulate) mod solid;
 
 use lattice_core::registration::{LabelDistribution, SemanticCloud};
 use nalgebra::{Isometry3, Point3, Vector3};

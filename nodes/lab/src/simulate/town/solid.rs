@@ -8,7 +8,7 @@ const WINDOWS_M: [f64; 2] = [2.6, 3.0];
 
 /// Form of a solid, metres.
 #[derive(Clone, Debug)]
-pub(super) enum Form {
+pub(in crate::simulate) enum Form {
     /// A box; with windows in its walls or none.
     Block {
         low: Point3<f64>,
@@ -27,12 +27,26 @@ pub(super) enum Form {
 
 /// A form with its class.
 #[derive(Clone, Debug)]
-pub(super) struct Solid {
+pub(in crate::simulate) struct Solid {
     pub form: Form,
     pub label: u16,
 }
 
 impl Solid {
+    /// The solid at another place.
+    pub fn moved(&self, by: &Vector3<f64>) -> Solid {
+        let mut moved = self.clone();
+        match &mut moved.form {
+            Form::Block { low, high, .. } => {
+                *low += by;
+                *high += by;
+            }
+            Form::Pillar { foot, .. } => *foot += by,
+            Form::Crown { center, .. } => *center += by,
+        }
+        moved
+    }
+
     /// Middle and radius of a circle about it in the plane, metres.
     pub fn circle(&self) -> (Point3<f64>, f64) {
         match &self.form {

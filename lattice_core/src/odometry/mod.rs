@@ -1,0 +1,246 @@
+//! Odometry of a lidar: the pose of each scan by registration with a map of the scans before.
+//!
+//! The map is a voxel list whose cells keep integer moments of their points ([`MomentMap`]). A scan is deskewed by
+//! constant velocity or a gyroscope, thinned to centroids, and moved by Gauss-Newton to the planes and points of its
+//! cell and the neighbouring ones, within a gate that follows from the deviations of predictions (Vizzo et al. 2023,
+//! KISS-ICP). Every pose has a [`Verdict`]. The same scans give the same bits on any number of threads.
+
+mod align;
+mod moment_map;
+mod moments;
+mod motion;
+mod sampling;
+mod submap;
+mod surface;
+mod sweep;
+#[cfg(test)]
+mod tests;
+mod verdict;
+
+use nalgebra::{Isometry3, Matrix6, Vector3};
+
+pub use moment_map::MomentMap;
+pub use moments::Moments;
+pub use motion::Prior;
+pub use sampling::Sizes;
+pub use sweep::AngularRate;
+pub use verdict::{LostCause, Verdict, WeakDirection};
+
+use crate::cloud::NO_TIME_NS;
+use crate::lattice::{LatticeError, LatticeKind};
+use align::Held;
+use submap::Submap;
+use sweep::Sweep;
+use verdict::{Evidence, can_begin, judge, least_contrast};
+
+/// Registrations of a scan, each deskewed by the velocity that the one before found: usually, and where the map explains
+/// less of it than usual.
+const PASSES: (usize, usize) = (2, 4);
+
+/// Options of the odometry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OdometryOptions {
+    /// Lattice of the map.
+    pub lattice: LatticeKind,
+}
+
+impl Default for OdometryOptions {
+    fn default() -> OdometryOptions {
+        OdometryOptions {
+            lattice: LatticeKind::Fcc,
+        }
+    }
+}
+
+/// A scan in the frame of the base.
+#[derive(Clone, Copy, Debug)]
+pub struct Scan<'a> {
+    /// Points, metres.
+    pub points_m: &'a [Vector3<f64>],
+    /// Time of each point, nanoseconds; `None`: all at the stamp.
+    pub times_ns: Option<&'a [i64]>,
+    /// Stamp, nanoseconds.
+    pub stamp_ns: i64,
+}
+
+impl Scan<'_> {
+    /// Times of the first and the last point; the stamp without times.
+    pub fn span_ns(&self) -> (i64, i64) {
+        let times = self.times_ns.into_iter().flatten().copied();
+        let known = times.filter(|time| *time != NO_TIME_NS);
+        let span = known.fold(None, |span: Option<(i64, i64)>, time| {
+            let (first, last) = span.unwrap_or((time, time));
+            Some((first.min(time), last.max(time)))
+        });
+        span.unwrap_or((self.stamp_ns, self.stamp_ns))
+    }
+}
+
+/// The pose of a scan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScanResult {
+    /// Time of the first point, nanoseconds.
+    pub first_ns: i64,
+    /// Pose of the base at that time.
+    pub odom_from_first: Isometry3<f64>,
+    /// Time of the last point, nanoseconds.
+    pub end_ns: i64,
+    /// Pose of the base at that time.
+    pub odom_from_base: Isometry3<f64>,
+    /// Covariance of a perturbation (translation, rotation) in the axes of `odom` about the base since the beginning of
+    /// the submap, m^2, m rad and rad^2.
+    pub covariance: Matrix6<f64>,
+    /// Verdict.
+    pub verdict: Verdict,
+    /// Number of the submap, from 0. Poses of two submaps are not known to each other.
+    pub submap: u32,
+    /// Part of the registered points that the map explains.
+    pub overlap: f64,
+    /// Points that were registered.
+    pub points: usize,
+    /// Standard deviations by which the map explains the scan better than at a cell's side from its pose, in the weakest
+    /// direction.
+    pub contrast: f64,
+}
+
+impl ScanResult {
+    /// The same with the pose at the time of the first point.
+    pub fn at_first(&self) -> ScanResult {
+        ScanResult {
+            end_ns: self.first_ns,
+            odom_from_base: self.odom_from_first,
+            ..self.clone()
+        }
+    }
+}
+
+/// Odometry by scans.
+#[derive(Clone)]
+pub struct Odometry {
+    options: OdometryOptions,
+    submap: Option<Submap>,
+}
+
+impl Odometry {
+    /// Odometry that has seen nothing.
+    pub fn new(options: OdometryOptions) -> Odometry {
+        Odometry {
+            options,
+            submap: None,
+        }
+    }
+
+    /// The pose of a scan. Scans come in the order of time.
+    ///
+    /// Fails if the options give no lattice.
+    pub fn register(&mut self, scan: &Scan, prior: &Prior) -> Result<ScanResult, LatticeError> {
+        let kind = self.options.lattice;
+        let (first_ns, end_ns) = scan.span_ns();
+        let Some(submap) = self.submap.as_mut().filter(|map| !map.is_given_up(end_ns)) else {
+            return self.begin(scan, prior);
+        };
+
+        // Predict the motion since the last scan.
+        let predicted = submap.motion.predict(submap.end_ns, end_ns, prior);
+        let guess = submap.odom_from_base * predicted;
+        let was_lost = submap.is_lost(end_ns);
+
+        // Register, deskewed by the predicted velocity, then by the one found.
+        let mut velocity = submap.motion.velocity();
+        let mut found = guess;
+        let mut pass = 1;
+        let (sample, alignment) = loop {
+            let sweep = Sweep::new(first_ns, end_ns, &velocity, prior.rates);
+            let points_m = sweep.deskew(scan.points_m, scan.times_ns);
+            let sample = submap.sizes.sample(&points_m, kind)?;
+            let alignment = match pass {
+                1 => submap.align_around(&sample, &found),
+                _ => submap.align(&sample, &found, &Held::default()),
+            };
+            let is_usual = !submap.is_suspicious(&alignment);
+            if pass >= if is_usual { PASSES.0 } else { PASSES.1 } {
+                break (sample, alignment);
+            }
+            pass += 1;
+            found = alignment.map_from_base;
+            velocity = submap.velocity_to(&found, end_ns);
+            submap.deskew_first(&velocity, kind)?;
+        };
+
+        // Leave what the map does not show to the prediction.
+        let (weak, contrast) =
+            submap.weak_directions(&sample, &alignment, least_contrast(was_lost));
+        let alignment = match weak.is_empty() {
+            true => alignment,
+            false => submap.align(&sample, &guess, &alignment.geometry.hold(&weak)),
+        };
+
+        // Judge, and grow the map by what is certain.
+        let weak_m = match weak.is_empty() {
+            true => 0.0,
+            false => submap.motion.add_weak(&predicted, prior),
+        };
+        let verdict = judge(Evidence {
+            points: sample.registered_m.len(),
+            overlap: alignment.overlap,
+            usual_overlap: submap.usual_overlap,
+            was_lost,
+            is_one_place: submap.is_one_place(&alignment.map_from_base),
+            weak,
+            weak_m,
+        });
+        let result = submap.follow((first_ns, end_ns), &sample, &alignment, &guess, verdict);
+        Ok(ScanResult { contrast, ..result })
+    }
+
+    /// Begins a submap with a scan, where the motion of the one before leads.
+    fn begin(&mut self, scan: &Scan, prior: &Prior) -> Result<ScanResult, LatticeError> {
+        let kind = self.options.lattice;
+        let (first_ns, end_ns) = scan.span_ns();
+        let odom_from_base = self
+            .submap
+            .as_ref()
+            .map_or_else(Isometry3::identity, |before| {
+                before.odom_from_base * before.motion.predict(before.end_ns, end_ns, prior)
+            });
+        // A map of which no pose was certain is replaced.
+        let number = match &self.submap {
+            Some(before) if before.only_place_m.is_some() => before.number,
+            Some(before) => before.number + 1,
+            None => 0,
+        };
+        let sizes = Sizes::of(scan.points_m, kind)?;
+        let sample = sizes.sample(scan.points_m, kind)?;
+        let mut result = ScanResult {
+            first_ns,
+            odom_from_first: odom_from_base,
+            end_ns,
+            odom_from_base,
+            covariance: Matrix6::zeros(),
+            verdict: Verdict::Lost(LostCause::FewPoints),
+            submap: number,
+            overlap: 0.0,
+            points: sample.registered_m.len(),
+            contrast: 0.0,
+        };
+        if !can_begin(sample.registered_m.len()) {
+            return Ok(result);
+        }
+        let mut submap = Submap::new(number, scan, sizes, kind, odom_from_base)?;
+        submap.grow(&sample);
+        self.submap = Some(submap);
+        result.verdict = Verdict::Lost(LostCause::OnePlace);
+        (result.overlap, result.contrast) = (1.0, f64::INFINITY);
+        Ok(result)
+    }
+
+    /// The map of the scans before.
+    pub fn map(&self) -> Option<&MomentMap> {
+        self.submap.as_ref().map(|submap| &submap.map)
+    }
+
+    /// Sizes of cells in use.
+    pub fn sizes(&self) -> Option<Sizes> {
+        self.submap.as_ref().map(|submap| submap.sizes)
+    }
+}

@@ -1,0 +1,145 @@
+//! Prediction of motion, its uncertainty, and the gate that follows from it.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector6};
+
+use super::sweep::{AngularRate, turn};
+use crate::pose::se3;
+
+/// Standard deviation of predictions at the beginning, metres.
+const FIRST_DEVIATION_M: f64 = 2.0;
+/// Deviations below this do not narrow the gate, metres.
+const LEAST_DEVIATION_M: f64 = 0.1;
+/// Floor of the deviation of one scan's prediction along weak directions: noise of a pose, metres.
+const POSE_NOISE_M: f64 = 0.01;
+/// Weight of the newest deviation in their mean: about the last 20.
+const NEWEST: f64 = 0.05;
+/// Error of a motion that wheels give, as a part of its length.
+const WHEEL_ERROR: f64 = 0.05;
+
+/// What is known of the motion since the scan before.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Prior<'a> {
+    /// Motion of the base from the end of the scan before to the end of this one, as of wheels: `before_from_now`.
+    pub motion: Option<Isometry3<f64>>,
+    /// Samples of a gyroscope from the end of the scan before to the end of this one, in order of time.
+    pub rates: &'a [AngularRate],
+}
+
+/// Constant velocity with the deviations from it.
+#[derive(Clone, Debug)]
+pub(super) struct Motion {
+    /// In the base frame, m/s and rad/s; `None` before two scans were registered.
+    velocity: Option<Vector6<f64>>,
+    /// Sum and number of squared deviations that make the gate.
+    squares: f64,
+    count: f64,
+    /// Mean of all squared deviations.
+    mean_square: f64,
+    /// Standard deviations along weak directions: of the motion from scan to scan, and of the position, metres.
+    weak_step_m: f64,
+    weak_m: f64,
+}
+
+impl Motion {
+    /// Unknown motion.
+    pub fn unknown() -> Motion {
+        Motion {
+            velocity: None,
+            squares: FIRST_DEVIATION_M * FIRST_DEVIATION_M,
+            count: 1.0,
+            mean_square: LEAST_DEVIATION_M * LEAST_DEVIATION_M,
+            weak_step_m: 0.0,
+            weak_m: 0.0,
+        }
+    }
+
+    /// Velocity in the base frame, m/s and rad/s.
+    pub fn velocity(&self) -> Vector6<f64> {
+        self.velocity.unwrap_or_else(Vector6::zeros)
+    }
+
+    /// True before two scans were registered.
+    pub fn is_unknown(&self) -> bool {
+        self.velocity.is_none()
+    }
+
+    /// Motion from the end of a scan to that of the next one.
+    pub fn predict(&self, from_ns: i64, to_ns: i64, prior: &Prior) -> Isometry3<f64> {
+        if let Some(motion) = prior.motion {
+            return motion;
+        }
+        let mut motion = se3::exp(&(self.velocity() * seconds(from_ns, to_ns)));
+        if !prior.rates.is_empty() {
+            motion.rotation = turn(prior.rates, from_ns, to_ns);
+        }
+        motion
+    }
+
+    /// Largest distance of corresponding points: three standard deviations of predictions, metres.
+    pub fn gate_m(&self) -> f64 {
+        3.0 * (self.squares / self.count).sqrt()
+    }
+
+    /// Takes the motion that registration found.
+    pub fn update(
+        &mut self,
+        found: &Isometry3<f64>,
+        predicted: &Isometry3<f64>,
+        seconds: f64,
+        arm_m: f64,
+    ) {
+        let apart = predicted.inverse() * found;
+        let turned_m = 2.0 * arm_m * (apart.rotation.angle() / 2.0).sin();
+        let deviation_m = apart.translation.vector.norm() + turned_m;
+        if deviation_m > LEAST_DEVIATION_M {
+            self.squares += deviation_m * deviation_m;
+            self.count += 1.0;
+        }
+        if self.velocity.is_some() {
+            self.mean_square += NEWEST * (deviation_m * deviation_m - self.mean_square);
+        }
+        if seconds > 0.0 {
+            self.velocity = Some(se3::log(found) / seconds);
+        }
+    }
+
+    /// Adds the uncertainty of a predicted motion along weak directions, and gives three standard deviations of the
+    /// position, metres: infinite if the velocity is unknown.
+    pub fn add_weak(&mut self, motion: &Isometry3<f64>, prior: &Prior) -> f64 {
+        let step_m = match (prior.motion, self.velocity) {
+            (Some(_), _) => WHEEL_ERROR * motion.translation.vector.norm(),
+            (None, None) => f64::INFINITY,
+            (None, Some(_)) => {
+                self.weak_step_m += self.mean_square.sqrt().max(POSE_NOISE_M);
+                self.weak_step_m
+            }
+        };
+        self.weak_m += step_m;
+        3.0 * self.weak_m
+    }
+
+    /// Ends a stretch of weak scans: the map holds the pose again.
+    pub fn end_weak(&mut self) {
+        (self.weak_step_m, self.weak_m) = (0.0, 0.0);
+    }
+
+    /// Standard deviation of the position along weak directions, metres.
+    pub fn weak_m(&self) -> f64 {
+        self.weak_m
+    }
+}
+
+pub(super) fn seconds(from_ns: i64, to_ns: i64) -> f64 {
+    to_ns.saturating_sub(from_ns) as f64 * 1e-9
+}
+
+/// Covariance of a pose carried along a displacement (axes of the map, metres): errors of rotation move it.
+pub(super) fn carried(
+    covariance: &Matrix6<f64>,
+    displacement_m: &nalgebra::Vector3<f64>,
+) -> Matrix6<f64> {
+    let mut carry = Matrix6::identity();
+    let lever: Matrix3<f64> = -displacement_m.cross_matrix();
+    carry.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
+    carry * covariance * carry.transpose()
+}

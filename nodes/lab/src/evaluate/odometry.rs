@@ -1,0 +1,285 @@
+//! Odometry of a lidar measured in simulated drives: drift, verdicts, and covariances against the truth.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Instant;
+
+use lattice_core::odometry::{Odometry, OdometryOptions, Prior, Scan, ScanResult, Verdict};
+use lattice_nodes::files::atomic_write::write_text;
+use nalgebra::{Isometry3, Vector6};
+use serde::{Deserialize, Serialize};
+
+use super::median;
+use crate::report::{Cell, Report, Section, Table};
+use crate::simulate::drive::{Drive, DriveScene};
+use crate::{AnyError, at};
+
+/// File of the trials in their folder.
+const TRIALS: &str = "trials.jsonl";
+/// Length of the segments over which relative errors are taken, m.
+const SEGMENT_M: f64 = 10.0;
+/// Error of a pose that must not be called `OK`, m.
+const WRONG_M: f64 = 1.0;
+
+/// One drive.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OdometryTrial {
+    /// Name of the scene.
+    pub scene: String,
+    /// Seed of the scene.
+    pub seed: u64,
+    /// Scans, and those of each verdict.
+    pub scans: u64,
+    /// Poses held in all directions.
+    pub ok: u64,
+    /// Poses predicted in some directions.
+    pub weak: u64,
+    /// Poses predicted.
+    pub lost: u64,
+    /// Submaps begun.
+    pub submaps: u64,
+    /// Root mean square of the errors of poses that are `OK`, since the beginnings of their submaps, m.
+    pub ate_m: f64,
+    /// Mean error over segments of 10 m, per cent.
+    pub rpe_percent: Option<f64>,
+    /// Largest error of a pose that is `OK`, m.
+    pub largest_m: f64,
+    /// Poses that are `OK` and off by more than 1 m.
+    pub wrong: u64,
+    /// Poses that are `OK` and off by more than three stated standard deviations.
+    pub beyond_3_sigma: u64,
+    /// Mean normalized estimation error squared of poses that are `OK`; 6 where covariances are right.
+    pub nees: Option<f64>,
+    /// Mean wall time of a scan on the threads of the run, ms.
+    pub ms: f64,
+}
+
+/// A pose with its truth, both since the beginning of the submap.
+struct Posed {
+    result: ScanResult,
+    found: Isometry3<f64>,
+    truth: Isometry3<f64>,
+}
+
+impl OdometryTrial {
+    /// Drives through a scene.
+    pub fn run(scene: DriveScene, seed: u64) -> Result<OdometryTrial, AnyError> {
+        let drive = Drive::new(scene, seed);
+        let mut odometry = Odometry::new(OdometryOptions::default());
+        let mut trial = OdometryTrial {
+            scene: scene.name().to_owned(),
+            seed,
+            ..OdometryTrial::default()
+        };
+        let mut begun: BTreeMap<u32, (Isometry3<f64>, Isometry3<f64>)> = BTreeMap::new();
+        let mut posed: Vec<Posed> = Vec::new();
+        for number in drive.scans() {
+            let scan = drive.scan(number);
+            let begin = Instant::now();
+            let result = odometry.register(
+                &Scan {
+                    points_m: &scan.points_m,
+                    times_ns: Some(&scan.times_ns),
+                    stamp_ns: scan.end_ns,
+                },
+                &Prior::default(),
+            )?;
+            trial.ms += begin.elapsed().as_secs_f64() * 1e3;
+            trial.scans += 1;
+            match result.verdict {
+                Verdict::Ok => trial.ok += 1,
+                Verdict::Weak(_) => trial.weak += 1,
+                Verdict::Lost(_) => trial.lost += 1,
+            }
+            if result.verdict != Verdict::Ok {
+                continue;
+            }
+            let truth = drive.pose(scan.end_ns);
+            let first = (result.odom_from_base, truth);
+            let (odom_first, true_first) = begun.entry(result.submap).or_insert(first);
+            posed.push(Posed {
+                found: odom_first.inverse() * result.odom_from_base,
+                truth: true_first.inverse() * truth,
+                // In the axes of the first scan, as the poses are.
+                result: turned(result, odom_first),
+            });
+        }
+        trial.ms /= trial.scans.max(1) as f64;
+        trial.submaps = begun.len() as u64;
+        trial.measure(&posed);
+        Ok(trial)
+    }
+
+    fn measure(&mut self, posed: &[Posed]) {
+        let mut nees = Vec::new();
+        let mut squares = 0.0;
+        for posed in posed {
+            let moved = posed.found.translation.vector - posed.truth.translation.vector;
+            let turned = (posed.found.rotation * posed.truth.rotation.inverse()).scaled_axis();
+            squares += moved.norm_squared();
+            self.largest_m = self.largest_m.max(moved.norm());
+            self.wrong += u64::from(moved.norm() > WRONG_M);
+            let error = Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z);
+            // The first scan of a submap is where it is.
+            let Some(inverse) = posed.result.covariance.try_inverse() else {
+                continue;
+            };
+            nees.push(error.dot(&(inverse * error)));
+            let spread = posed
+                .result
+                .covariance
+                .fixed_view::<3, 3>(0, 0)
+                .into_owned();
+            let deviation_m = spread.symmetric_eigenvalues().max().sqrt();
+            self.beyond_3_sigma += u64::from(moved.norm() > 3.0 * deviation_m);
+        }
+        let mean = |values: &[f64]| {
+            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+        };
+        self.ate_m = (squares / posed.len().max(1) as f64).sqrt();
+        self.nees = mean(&nees);
+        self.rpe_percent = mean(&segments(posed)).map(|error_m| 100.0 * error_m / SEGMENT_M);
+    }
+}
+
+/// A result in the axes of another pose.
+fn turned(mut result: ScanResult, axes: &Isometry3<f64>) -> ScanResult {
+    let turn = axes.rotation.inverse().to_rotation_matrix();
+    let mut both = nalgebra::Matrix6::zeros();
+    for at in [0, 3] {
+        both.fixed_view_mut::<3, 3>(at, at).copy_from(turn.matrix());
+    }
+    result.covariance = both * result.covariance * both.transpose();
+    result
+}
+
+/// Errors of the motion over segments within submaps, m.
+fn segments(posed: &[Posed]) -> Vec<f64> {
+    let mut errors = Vec::new();
+    for (i, from) in posed.iter().enumerate() {
+        let mut length_m = 0.0;
+        let rest = posed.get(i..).unwrap_or_default();
+        let steps = rest.windows(2).filter_map(|pair| match pair {
+            [a, b] => Some((a, b)),
+            _ => None,
+        });
+        for (a, b) in steps.take_while(|(_, b)| b.result.submap == from.result.submap) {
+            length_m += (b.truth.translation.vector - a.truth.translation.vector).norm();
+            if length_m >= SEGMENT_M {
+                let found = from.found.inverse() * b.found;
+                let truth = from.truth.inverse() * b.truth;
+                errors.push((found.translation.vector - truth.translation.vector).norm());
+                break;
+            }
+        }
+    }
+    errors
+}
+
+/// Runs all drives that the folder does not have yet, and gives all trials.
+pub fn run_odometry(
+    folder: &Path,
+    scenes: &[DriveScene],
+    seeds: u64,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<Vec<OdometryTrial>, AnyError> {
+    std::fs::create_dir_all(folder).map_err(at(folder))?;
+    let path = folder.join(TRIALS);
+    let mut trials: Vec<OdometryTrial> = Vec::new();
+    if path.exists() {
+        let text = std::fs::read_to_string(&path).map_err(at(&path))?;
+        for line in text.lines() {
+            trials.push(serde_json::from_str(line)?);
+        }
+    }
+    let all = scenes
+        .iter()
+        .flat_map(|scene| (0..seeds).map(|seed| (*scene, seed)));
+    let all: Vec<(DriveScene, u64)> = all.collect();
+    for (i, (scene, seed)) in all.iter().enumerate() {
+        progress(i, all.len());
+        let is_it = |trial: &OdometryTrial| trial.scene == scene.name() && trial.seed == *seed;
+        if trials.iter().any(is_it) {
+            continue;
+        }
+        trials.push(OdometryTrial::run(*scene, *seed)?);
+        let lines = trials.iter().map(serde_json::to_string);
+        let lines = lines.collect::<Result<Vec<_>, _>>()?;
+        write_text(&path, &(lines.join("\n") + "\n"))?;
+    }
+    trials.sort_by(|a, b| (&a.scene, a.seed).cmp(&(&b.scene, b.seed)));
+    Ok(trials)
+}
+
+/// A table with one line for each scene.
+pub fn odometry_report(trials: &[OdometryTrial]) -> Report {
+    let mut scenes: BTreeMap<&str, Vec<&OdometryTrial>> = BTreeMap::new();
+    for trial in trials {
+        scenes.entry(&trial.scene).or_default().push(trial);
+    }
+    let rows = scenes.iter().map(|(scene, trials)| line(scene, trials));
+    let columns = "scene|seeds|OK, %|WEAK, %|LOST, %|median ATE, m|largest error, m|median RPE, %|\
+        wrong OK|OK beyond 3 sigma, %|median NEES|median time of a scan, ms";
+    let lead = format!(
+        "Simulated drives with motion during each scan. Errors are those of poses that are OK, since the beginnings of \
+         their submaps; RPE over {SEGMENT_M} m; a pose that is OK and off by more than {WRONG_M} m is wrong."
+    );
+    let section = Section {
+        tables: vec![Table::new(
+            "odometry",
+            "All scenes",
+            columns,
+            rows.collect::<Vec<Vec<Cell>>>(),
+        )],
+        ..Section::measured("odometry", "Lidar odometry against the truth", "")
+    };
+    let command = "lattice evaluate odometry".to_owned();
+    Report::new("Lidar odometry", lead, command, vec![section])
+}
+
+fn line(scene: &str, trials: &[&OdometryTrial]) -> Vec<Cell> {
+    let sum = |of: fn(&OdometryTrial) -> u64| trials.iter().map(|t| of(t)).sum::<u64>();
+    let part = |count: u64, of: u64| format!("{:.1}", 100.0 * count as f64 / of.max(1) as f64);
+    let middle = |of: fn(&OdometryTrial) -> Option<f64>, digits: usize| {
+        let middle = median(trials.iter().filter_map(|t| of(t)));
+        middle.map_or("-".to_owned(), |middle| format!("{middle:.digits$}"))
+    };
+    let largest_m = trials.iter().map(|t| t.largest_m).fold(0.0, f64::max);
+    let scans = sum(|t| t.scans);
+    vec![
+        scene.into(),
+        trials.len().into(),
+        part(sum(|t| t.ok), scans).into(),
+        part(sum(|t| t.weak), scans).into(),
+        part(sum(|t| t.lost), scans).into(),
+        middle(|t| Some(t.ate_m), 3).into(),
+        format!("{largest_m:.3}").into(),
+        middle(|t| t.rpe_percent, 2).into(),
+        (sum(|t| t.wrong) as usize).into(),
+        part(sum(|t| t.beyond_3_sigma), sum(|t| t.ok)).into(),
+        middle(|t| t.nees, 1).into(),
+        middle(|t| Some(t.ms), 0).into(),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::markdown;
+
+    #[test]
+    fn a_plane_is_never_called_certain_and_results_are_continued() {
+        let folder = tempfile::tempdir().unwrap();
+        let scenes = [DriveScene::Yard];
+        let trials = run_odometry(folder.path(), &scenes, 1, &mut |_, _| {}).unwrap();
+        let [trial] = trials.as_slice() else {
+            panic!("{trials:?}")
+        };
+        // The first scan of each submap is where it is.
+        assert_eq!((trial.ok, trial.wrong), (trial.submaps, 0), "{trial:?}");
+        assert!(trial.lost > 10 * trial.ok);
+        let again = run_odometry(folder.path(), &scenes, 1, &mut |_, _| {}).unwrap();
+        assert_eq!(again, trials);
+        assert!(markdown(&odometry_report(&trials)).contains("| yard | 1 |"));
+    }
+}

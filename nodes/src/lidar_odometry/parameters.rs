@@ -1,0 +1,53 @@
+//! All parameters of the odometry.
+
+use super::LidarOdometryOptions;
+use crate::compute::ComputeLimits;
+use crate::options::{self, FRAME, TOPIC};
+use crate::report;
+use lattice_runtime::about;
+use lattice_runtime::params::{About, ParamError, Params};
+
+const ABOUT: &[About] = about! {
+    "odom_frame" fixed(FRAME): "Frame of the poses: the machine where the first scan ends.";
+    "base_frame" fixed(FRAME): "Frame of the machine; that of the clouds needs a transform to it.";
+    "publish_tf" fixed(TOPIC): "Whether odom_frame -> base_frame is published; false beside wheel odometry that publishes it.";
+    "min_range_m" fixed(MAP): "Points nearer to the machine's sensor are left out.";
+    "max_range_m" fixed(MAP): "Points farther from the sensor are left out; 0: no limit.";
+    "max_cloud_points" fixed(MAP): "Clouds of more points are refused.";
+    "deskew" fixed(MAP): "Whether points are moved to where they were at the end of the scan.";
+    "time.field" fixed(MAP): "Field of the time of points; empty: time, t, timestamp, offset_time, ts, stamp and the like, with or without a unit behind the name (_ns, _us, _ms, _s).";
+    "time.unit" fixed(MAP): "auto, s, ms, us or ns.";
+    "time.reference" fixed(MAP): "auto, stamp_start, stamp_end or absolute.";
+    "time.max_span_s" fixed(MAP): "Longest span of one cloud; a longer one is taken for a wrong unit and refused, single points farther from the others are left out.";
+};
+
+const MAP: &str = "the map of the scans before is made with it";
+
+/// Settings of the node by its parameters.
+pub(super) struct Settings {
+    pub odometry: LidarOdometryOptions,
+    pub limits: ComputeLimits,
+    pub report_file: String,
+}
+
+impl Settings {
+    /// Reads the parameters of the node.
+    pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
+        params.describe(ABOUT);
+        params.describe(options::COMMON);
+        Ok(Self {
+            odometry: LidarOdometryOptions::from_params(params)?,
+            limits: ComputeLimits {
+                events: options::inbox_events(params, 256)?,
+                bytes: options::inbox_bytes(params, 64 << 20)?,
+                threads: options::threads(params, 0)?,
+            },
+            report_file: report::file(params)?,
+        })
+    }
+}
+
+/// Reads all parameters of the node, as its start does.
+pub fn declare(params: &Params) -> Result<(), ParamError> {
+    Settings::from_params(params).map(drop)
+}

@@ -1,0 +1,205 @@
+//! Poses for a log that has none: lidar odometry over its clouds.
+
+use std::collections::BTreeMap;
+
+use lattice_bag::{BagReader, ReadOptions};
+use lattice_core::odometry::{ScanResult, Verdict};
+use lattice_msgs::cdr;
+use lattice_msgs::nav_msgs::Odometry;
+use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::tf2_msgs::TFMessage;
+use serde::{Deserialize, Serialize};
+
+use super::plan::TopicPlan;
+use super::topics::{Role, TopicError};
+use crate::enu_transformer::Refusal;
+use crate::lidar_odometry::{
+    LidarOdometry, LidarOdometryOptions, OdometryCounts, PAUSE_NS, odometry_message,
+};
+
+/// Odometry of a replay.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ScanPosesReport {
+    /// Topic of the clouds.
+    pub topic: String,
+    /// Scans by verdict, and length of the path.
+    pub counts: OdometryCounts,
+    /// Scans that are `OK` in the submap that is mapped.
+    pub scans_mapped: u64,
+    /// Scans that are `OK` in submaps whose place in the mapped one is unknown.
+    pub scans_elsewhere: u64,
+    /// Clouds refused, by reason, with value and remedy.
+    pub refusals: Vec<Refusal>,
+}
+
+impl ScanPosesReport {
+    /// One line per loss.
+    pub(super) fn losses(&self) -> Vec<String> {
+        let counts = &self.counts;
+        let all = counts.clouds_in;
+        let reasons = [
+            (
+                "WEAK: the surfaces in view show the motion in part",
+                counts.scans_weak,
+            ),
+            ("LOST: too few points", counts.lost_few_points),
+            (
+                "LOST: the map does not explain the scan",
+                counts.lost_no_overlap,
+            ),
+            (
+                "LOST: the surfaces in view do not show the motion",
+                counts.lost_unobservable,
+            ),
+            (
+                "LOST: the machine has not moved by 0.3 m since its map began",
+                counts.lost_one_place,
+            ),
+            (
+                "in submaps whose place in the map is unknown, as nothing joins them",
+                self.scans_elsewhere,
+            ),
+        ];
+        let lost = reasons.into_iter().filter(|(_, count)| *count > 0);
+        let lost = lost.map(|(reason, count)| format!("{count} of {all} scans {reason}"));
+        let refused = self.refusals.iter().map(|refusal| {
+            let Refusal {
+                topic,
+                reason,
+                count,
+                text,
+            } = refusal;
+            format!("{count} on {topic} ({reason}): {text}")
+        });
+        lost.chain(refused).collect()
+    }
+
+    /// Cause for which no scan has a pose that is certain.
+    pub(super) fn cause_of_nothing(&self) -> Option<String> {
+        let counts = &self.counts;
+        let all_lost = counts.clouds_in > 0 && counts.scans_ok == 0;
+        all_lost.then(|| {
+            let losses = self.losses().join("; ");
+            format!("all scans of {} are lost: {losses}", self.topic)
+        })
+    }
+
+    /// Clouds that are not given to the map.
+    pub(super) fn left_out(&self) -> u64 {
+        self.counts.clouds_in - self.scans_mapped.min(self.counts.clouds_in)
+    }
+}
+
+impl std::fmt::Display for ScanPosesReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let counts = &self.counts;
+        write!(
+            f,
+            "odometry: {} scans of {}: {} OK, {} WEAK, {} LOST; path {:.1} m; {} mapped, {} submaps",
+            counts.clouds_in,
+            self.topic,
+            counts.scans_ok,
+            counts.scans_weak,
+            counts.scans_lost(),
+            counts.path_m,
+            self.scans_mapped,
+            counts.submaps
+        )
+    }
+}
+
+/// Poses of the scans of a log, by the log time of their clouds.
+pub(super) struct ScanPoses {
+    scans: BTreeMap<i64, ScanResult>,
+    odom_frame: String,
+    base_frame: String,
+    /// The submap with the most scans that are `OK`.
+    mapped: u32,
+    pub topic: usize,
+    pub report: ScanPosesReport,
+}
+
+impl ScanPoses {
+    /// Runs the odometry over the clouds of a topic up to a log time.
+    pub fn of(
+        bag: &BagReader,
+        plan: &TopicPlan,
+        topic: usize,
+        options: LidarOdometryOptions,
+        end_ns: Option<i64>,
+        progress: &mut dyn FnMut(i64),
+    ) -> Result<Self, TopicError> {
+        let name = bag.topics().get(topic).map_or("", |topic| &topic.name);
+        let (odom_frame, base_frame) = (options.odom_frame.clone(), options.base_frame.clone());
+        let mut machine = LidarOdometry::new(options);
+        machine.on_tf(&plan.late_statics, true);
+        let read = ReadOptions {
+            topics: Some(plan.names(bag, |role| !matches!(role, Role::Ins(_)))),
+            end_ns,
+            ..ReadOptions::default()
+        };
+        let mut scans = BTreeMap::new();
+        for message in bag.messages(&read)? {
+            let message = message?;
+            match plan.roles.get(&message.topic) {
+                Some(Role::Cloud) if message.topic == topic => {
+                    // What does not decode is counted when it is mapped.
+                    if let Ok(cloud) = cdr::from_slice::<PointCloud2>(&message.data) {
+                        let result = machine.on_cloud(name, &cloud);
+                        scans.extend(result.map(|result| (message.log_time_ns, result)));
+                    }
+                }
+                Some(Role::Transforms(is_static)) => {
+                    if let Ok(transforms) = cdr::from_slice::<TFMessage>(&message.data) {
+                        machine.on_tf(&transforms, *is_static);
+                    }
+                }
+                _ => {}
+            }
+            progress(message.log_time_ns);
+        }
+        let mut in_submaps: BTreeMap<u32, u64> = BTreeMap::new();
+        for scan in scans.values().filter(|scan| scan.verdict == Verdict::Ok) {
+            *in_submaps.entry(scan.submap).or_default() += 1;
+        }
+        // The earliest of equals.
+        let best = in_submaps.iter().rev().max_by_key(|(_, count)| **count);
+        let (mapped, scans_mapped) = best.map_or((0, 0), |(submap, count)| (*submap, *count));
+        Ok(Self {
+            report: ScanPosesReport {
+                topic: name.to_owned(),
+                counts: machine.counts().clone(),
+                scans_mapped,
+                scans_elsewhere: in_submaps.values().sum::<u64>() - scans_mapped,
+                refusals: machine.refusals().to_vec(),
+            },
+            scans,
+            odom_frame,
+            base_frame,
+            mapped,
+            topic,
+        })
+    }
+
+    /// Poses that cover the cloud of a log time; `None` if it is not to be mapped.
+    pub fn poses(&self, log_time_ns: i64) -> Option<Vec<Odometry>> {
+        let is_mapped =
+            |scan: &&ScanResult| scan.verdict == Verdict::Ok && scan.submap == self.mapped;
+        let scan = self.scans.get(&log_time_ns).filter(is_mapped)?;
+        let before = self.scans.range(..log_time_ns).next_back();
+        let before = before.map(|(_, scan)| scan).filter(is_mapped);
+        let follows =
+            |before: &&ScanResult| scan.first_ns.saturating_sub(before.end_ns) <= PAUSE_NS;
+        let mut poses = vec![self.message(scan)];
+        if let Some(before) = before.filter(follows) {
+            poses.insert(0, self.message(before));
+        } else if scan.first_ns < scan.end_ns {
+            poses.insert(0, self.message(&scan.at_first()));
+        }
+        Some(poses)
+    }
+
+    fn message(&self, scan: &ScanResult) -> Odometry {
+        odometry_message(&self.odom_frame, &self.base_frame, scan)
+    }
+}
