@@ -15,7 +15,7 @@ const SIDE_SPACINGS: f64 = 8.0;
 const SIDES_M: (f64, f64) = (0.3, 1.5);
 /// Centroids for the map, at least and at most: a cell of the map gets some of each scan.
 const CENTROIDS: (usize, usize) = (3000, 8000);
-/// Points for registration, at least and at most.
+/// Limits of the number of points for registration.
 const REGISTERED: (usize, usize) = (1000, 2500);
 /// Steps between two sizes: 2^(1/4).
 const STEP: f64 = 1.189_207_115;

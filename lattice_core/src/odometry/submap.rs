@@ -107,7 +107,7 @@ impl Submap {
         self.only_place_m.is_some_and(is_near)
     }
 
-    /// Directions of motion in which the map does not tell the pose of a scan from one a cell away, weakest first, and the
+    /// Directions of motion in which the map explains a scan no better than at a pose one cell away, weakest first, and the
     /// least contrast of those tried.
     pub fn weak_directions(
         &self,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use lattice_core::odometry::{ScanResult, Verdict};
+use lattice_core::odometry::{LostCause, ScanResult, Verdict};
 use lattice_msgs::nav_msgs::{Odometry, Path};
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
@@ -176,6 +176,10 @@ impl Shell {
             Some(Verdict::Weak(directions)) => {
                 let text = format!("WEAK: {} motions are predicted", directions.len());
                 (Level::Warn, text)
+            }
+            // As of every machine at rest when it starts.
+            Some(Verdict::Lost(cause @ LostCause::OnePlace)) => {
+                (Level::Warn, format!("LOST: {cause}"))
             }
             Some(Verdict::Lost(cause)) => (Level::Error, format!("LOST: {cause}")),
             None => {

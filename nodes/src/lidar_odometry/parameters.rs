@@ -8,17 +8,17 @@ use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
-    "odom_frame" fixed(FRAME): "Frame of the poses: the machine where the first scan ends.";
-    "base_frame" fixed(FRAME): "Frame of the machine; that of the clouds needs a transform to it.";
-    "publish_tf" fixed(TOPIC): "Whether odom_frame -> base_frame is published; false beside wheel odometry that publishes it.";
-    "min_range_m" fixed(MAP): "Points nearer to the machine's sensor are left out.";
-    "max_range_m" fixed(MAP): "Points farther from the sensor are left out; 0: no limit.";
-    "max_cloud_points" fixed(MAP): "Clouds of more points are refused.";
-    "deskew" fixed(MAP): "Whether points are moved to where they were at the end of the scan.";
+    "odom_frame" fixed(FRAME): "Frame of the poses; its origin is the machine at the end of the first scan.";
+    "base_frame" fixed(FRAME): "Frame of the machine; the frame of the clouds needs a transform to it.";
+    "publish_tf" fixed(TOPIC): "Whether odom_frame -> base_frame is published; false where wheel odometry publishes it.";
+    "min_range_m" fixed(MAP): "Points nearer to the sensor are rejected.";
+    "max_range_m" fixed(MAP): "Points farther from the sensor are rejected; 0: no limit.";
+    "max_cloud_points" fixed(MAP): "Limit of points per cloud; larger clouds are rejected.";
+    "deskew" fixed(MAP): "Whether points are motion-compensated by their own times.";
     "time.field" fixed(MAP): "Field of the time of points; empty: time, t, timestamp, offset_time, ts, stamp and the like, with or without a unit behind the name (_ns, _us, _ms, _s).";
     "time.unit" fixed(MAP): "auto, s, ms, us or ns.";
     "time.reference" fixed(MAP): "auto, stamp_start, stamp_end or absolute.";
-    "time.max_span_s" fixed(MAP): "Longest span of one cloud; a longer one is taken for a wrong unit and refused, single points farther from the others are left out.";
+    "time.max_span_s" fixed(MAP): "Longest time span of one cloud; a longer one indicates a wrong unit and is rejected, single outlying points are dropped.";
 };
 
 const MAP: &str = "the map of the scans before is made with it";

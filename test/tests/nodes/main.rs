@@ -6,6 +6,7 @@ mod free_space;
 mod headset_cloud;
 mod lattice_mapper;
 mod lattice_mapper_services;
+mod lidar_odometry;
 mod map_follower;
 mod map_labels;
 mod map_merger;

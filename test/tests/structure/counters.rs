@@ -11,7 +11,7 @@ const PAGE: &str = "docs/counters.md";
 
 /// Numbers in reports and diagnostics that count nothing: sizes, states, rates, and a place in a log.
 const STATES: &str = "address begin_ns camera_info clients clouds_waiting depth end_ns evidence images_waiting latest_ms map_bytes mesh mesh_bytes \
-    now_ns onnx origin paused rate voxels";
+    now_ns onnx origin paused rate submap voxels";
 
 /// Counters that no test here drives, and why.
 const ELSEWHERE: [(&str, &str); 2] = [

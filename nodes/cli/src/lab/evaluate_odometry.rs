@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// Options of `lattice evaluate odometry`.
 #[derive(Args)]
 pub struct OfDrives {
-    /// Folder of the results and the report; a run that was ended goes on where it was
+    /// Folder of the results and the report; a run that was ended is continued
     #[arg(long)]
     out: PathBuf,
     /// Drives of each scene

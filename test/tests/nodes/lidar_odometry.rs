@@ -1,0 +1,183 @@
+//! Lidar odometry: every cloud is counted by its verdict or by the reason for which it has none, live and in replays.
+
+use std::path::Path;
+
+use lattice_bag::{BagReader, BagWriter, Storage, TopicSpec, WriterOptions};
+use lattice_core::lattice::LatticeKind;
+use lattice_core::odometry::Verdict;
+use lattice_lab::simulate::drive::{Drive, DriveScan, DriveScene};
+use lattice_msgs::cdr;
+use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_nodes::enu_transformer::TransformerOptions;
+use lattice_nodes::lidar_odometry::{LidarOdometry, LidarOdometryOptions};
+use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
+use lattice_nodes::voxel_marker_publisher::MarkerOptions;
+use lattice_test::clouds::{cloud, timed_cloud};
+use lattice_test::maps;
+
+const START_NS: i64 = 1_700_000_000_000_000_000;
+
+/// A scan of a drive as an Ouster's driver sends it, later by `delay_ns`.
+fn message(scan: &DriveScan, delay_ns: i64) -> PointCloud2 {
+    let first_ns = scan.times_ns.iter().copied().min().unwrap_or(scan.end_ns);
+    let points = scan.points_m.iter().zip(&scan.times_ns);
+    let points = points.map(|(p, time_ns)| {
+        let point = [p.x as f32, p.y as f32, p.z as f32];
+        (point, (time_ns - first_ns) as u32)
+    });
+    let stamp_ns = START_NS + delay_ns + first_ns;
+    timed_cloud("lidar", stamp_ns, &points.collect::<Vec<_>>())
+}
+
+fn of_lidar() -> LidarOdometry {
+    LidarOdometry::new(LidarOdometryOptions {
+        base_frame: "lidar".into(),
+        ..LidarOdometryOptions::default()
+    })
+}
+
+#[test]
+fn every_cloud_is_counted_once() {
+    let mut odometry = of_lidar();
+    let drive = Drive::new(DriveScene::Indoor, 1);
+    let mut verdicts = [0; 3];
+    let mut newest = None;
+    for number in 30..60 {
+        let cloud = message(&drive.scan(number), 0);
+        let result = odometry.on_cloud("points", &cloud).unwrap();
+        verdicts[match result.verdict {
+            Verdict::Ok => 0,
+            Verdict::Weak(_) => 1,
+            Verdict::Lost(_) => 2,
+        }] += 1;
+        newest = Some(cloud);
+    }
+    let counts = odometry.counts().clone();
+    assert_eq!(
+        (counts.scans_ok, counts.scans_weak),
+        (verdicts[0], verdicts[1])
+    );
+    // The first scan, and those before the machine has moved by 0.3 m at up to 1.3 m/s.
+    assert_eq!(counts.lost_one_place, verdicts[2]);
+    assert!((3..=10).contains(&counts.lost_one_place), "{counts:?}");
+    assert_eq!(counts.submaps, 1);
+
+    // A cloud that comes again, one of another frame, one whose bytes are short.
+    let mut newest = newest.unwrap();
+    assert!(odometry.on_cloud("points", &newest).is_none());
+    newest.header.stamp.sec += 1;
+    let mut short = newest.clone();
+    short.data.truncate(100);
+    assert!(odometry.on_cloud("points", &short).is_none());
+    newest.header.frame_id = "mast".into();
+    assert!(odometry.on_cloud("points", &newest).is_none());
+    // Three points.
+    let few = cloud("lidar", START_NS + 6_100_000_000, &[[1.0, 0.0, 0.0]; 3]);
+    assert!(odometry.on_cloud("points", &few).is_some());
+    // A place that the map does not show.
+    let elsewhere = Drive::new(DriveScene::Town, 1).scan(62);
+    assert!(
+        odometry
+            .on_cloud("points", &message(&elsewhere, 0))
+            .is_some()
+    );
+
+    let counts = odometry.counts();
+    let once = [
+        counts.clouds_out_of_order,
+        counts.clouds_malformed,
+        counts.clouds_no_mount,
+        counts.lost_few_points,
+        counts.lost_no_overlap,
+    ];
+    assert_eq!(once, [1; 5], "{counts:?}");
+    assert_eq!(counts.clouds_in, 35);
+    let reasons: Vec<_> = odometry
+        .refusals()
+        .iter()
+        .map(|r| r.reason.as_str())
+        .collect();
+    assert_eq!(
+        reasons,
+        ["clouds_out_of_order", "clouds_malformed", "clouds_no_mount"]
+    );
+}
+
+#[test]
+fn a_tunnel_is_weak_and_then_lost() {
+    let mut odometry = of_lidar();
+    let drive = Drive::new(DriveScene::Tunnel, 1);
+    for number in 50..130 {
+        let cloud = message(&drive.scan(number), 0);
+        odometry.on_cloud("points", &cloud).unwrap();
+    }
+    let counts = odometry.counts();
+    assert!(counts.scans_ok > 10, "{counts:?}");
+    assert!(counts.scans_weak > 0, "{counts:?}");
+    assert!(counts.lost_unobservable > 0, "{counts:?}");
+    assert_eq!(
+        counts.scans_ok + counts.scans_weak + counts.scans_lost(),
+        counts.clouds_in
+    );
+}
+
+/// A log of clouds alone: one room, and then a street.
+fn write_log(log: &Path) {
+    let mut writer = BagWriter::create(log, Storage::Mcap, WriterOptions::default()).unwrap();
+    let points = TopicSpec {
+        name: "/points".into(),
+        type_name: "sensor_msgs/msg/PointCloud2".into(),
+        type_hash: String::new(),
+        definition: None,
+        offered_qos: Vec::new(),
+    };
+    let points = writer.add_topic(points).unwrap();
+    let scenes = [(DriveScene::Indoor, 30..60), (DriveScene::Town, 60..100)];
+    for (scene, numbers) in scenes {
+        let drive = Drive::new(scene, 1);
+        for number in numbers {
+            let scan = drive.scan(number);
+            let data = cdr::to_vec(&message(&scan, 0)).unwrap();
+            writer.write(points, START_NS + scan.end_ns, &data).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn a_replay_maps_one_submap_and_counts_the_scans_of_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("log");
+    write_log(&log);
+    let bag = BagReader::open(&log).unwrap();
+    let plan = replay::plan(&bag, &TopicWishes::default()).unwrap();
+    let mut transformer = TransformerOptions::new(plan.source);
+    transformer.map_frame.clone_from(&plan.map_frame);
+    transformer.base_frame.clone_from(&plan.base_frame);
+    let mut pipeline = Pipeline::new(
+        transformer,
+        [maps::options(LatticeKind::Fcc, 0.2)],
+        &MarkerOptions::default(),
+    )
+    .unwrap();
+    let report = replay::run(
+        &bag,
+        &plan,
+        &Slice::WHOLE,
+        &mut pipeline,
+        "log",
+        &mut |_| {},
+    );
+    let report = report.unwrap();
+    let odometry = report.odometry.as_ref().unwrap();
+    let (mapped, elsewhere) = (odometry.scans_mapped, odometry.scans_elsewhere);
+    assert_eq!(mapped + elsewhere, odometry.counts.scans_ok);
+    assert!(mapped > 15 && elsewhere > 15, "{odometry:?}");
+    assert_eq!(odometry.counts.submaps, 2);
+    assert_eq!(report.transformer.counts.clouds_out, mapped);
+    let said = report.to_string();
+    assert!(
+        said.contains("in submaps whose place in the map is unknown"),
+        "{said}"
+    );
+}
