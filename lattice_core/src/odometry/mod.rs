@@ -146,7 +146,10 @@ impl Odometry {
         let was_lost = submap.is_lost(end_ns);
 
         // Register, deskewed by the predicted velocity, then by the one found.
-        let mut velocity = submap.motion.velocity();
+        let mut velocity = match prior.motion {
+            Some(_) => submap.velocity_to(&guess, end_ns),
+            None => submap.motion.velocity(),
+        };
         let mut found = guess;
         let mut pass = 1;
         let (sample, alignment) = loop {

@@ -65,10 +65,8 @@ impl Motion {
 
     /// Motion from the end of a scan to that of the next one.
     pub fn predict(&self, from_ns: i64, to_ns: i64, prior: &Prior) -> Isometry3<f64> {
-        if let Some(motion) = prior.motion {
-            return motion;
-        }
-        let mut motion = se3::exp(&(self.velocity() * seconds(from_ns, to_ns)));
+        let steady = || se3::exp(&(self.velocity() * seconds(from_ns, to_ns)));
+        let mut motion = prior.motion.unwrap_or_else(steady);
         if !prior.rates.is_empty() {
             motion.rotation = turn(prior.rates, from_ns, to_ns);
         }

@@ -2,6 +2,7 @@
 //!
 //! [`LidarOdometry`] is a state machine without I/O around [`lattice_core::odometry`].
 
+mod motions;
 pub mod node;
 mod options;
 mod parameters;
@@ -17,8 +18,9 @@ use lattice_core::odometry::{
 use lattice_core::pose::{TransformBuffer, TransformBufferOptions};
 use lattice_msgs::geometry_msgs::{PoseWithCovariance, TransformStamped};
 use lattice_msgs::nav_msgs::Odometry;
-use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::sensor_msgs::{Imu, PointCloud2};
 use lattice_msgs::tf2_msgs::TFMessage;
+use motions::Motions;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -53,6 +55,14 @@ pub struct OdometryCounts {
     pub clouds_no_mount: u64,
     /// Dropped: older than the cloud before.
     pub clouds_out_of_order: u64,
+    /// Samples of a gyroscope that are not used.
+    pub imu_refused: u64,
+    /// Poses of wheels that are not used.
+    pub wheels_refused: u64,
+    /// Scans deskewed and predicted by a gyroscope.
+    pub scans_with_imu: u64,
+    /// Scans predicted by wheels.
+    pub scans_with_wheels: u64,
     /// Submaps begun.
     pub submaps: u64,
     /// Length of the path of poses that are not lost, m.
@@ -73,6 +83,8 @@ pub struct OdometryReport {
     pub counts: OdometryCounts,
     /// Clouds that found the inbox, or the queue before it, full.
     pub clouds_inbox_full: u64,
+    /// Samples of imu and wheels that found the inbox full.
+    pub motion_inbox_full: u64,
     /// Clouds that were sent and did not come.
     pub clouds_lost_on_network: u64,
     /// Samples that did not decode.
@@ -83,6 +95,34 @@ pub struct OdometryReport {
     pub notes: Vec<CloudNote>,
 }
 
+/// Pose of a scan, with the tag of its cloud.
+#[derive(Clone, Debug)]
+pub struct Registered {
+    /// As given with the cloud.
+    pub tag: i64,
+    /// Pose and verdict.
+    pub result: ScanResult,
+}
+
+/// A scan in the frame of the machine.
+struct ReadScan {
+    topic: String,
+    points_m: Vec<Vector3<f64>>,
+    times_ns: Option<Vec<i64>>,
+    stamp_ns: i64,
+    tag: i64,
+}
+
+impl ReadScan {
+    fn scan(&self) -> Scan<'_> {
+        Scan {
+            points_m: &self.points_m,
+            times_ns: self.times_ns.as_deref(),
+            stamp_ns: self.stamp_ns,
+        }
+    }
+}
+
 /// Poses of a lidar, scan by scan.
 pub struct LidarOdometry {
     options: LidarOdometryOptions,
@@ -91,6 +131,9 @@ pub struct LidarOdometry {
     notes: CloudNotes,
     refusals: Refusals,
     counts: OdometryCounts,
+    motions: Motions,
+    /// Scan that waits for the motion up to its end.
+    waiting: Option<ReadScan>,
     last: Option<ScanResult>,
     /// End of the last scan with a certain pose.
     certain_ns: Option<i64>,
@@ -110,6 +153,8 @@ impl LidarOdometry {
             notes: CloudNotes::default(),
             refusals: Refusals::default(),
             counts: OdometryCounts::default(),
+            motions: Motions::new(),
+            waiting: None,
             last: None,
             certain_ns: None,
             options,
@@ -120,7 +165,8 @@ impl LidarOdometry {
     pub fn on_tf(&mut self, message: &TFMessage, is_static: bool) {
         for transform in &message.transforms {
             let (parent, child) = (&transform.header.frame_id, &transform.child_frame_id);
-            if child.trim_start_matches('/') == self.options.base_frame {
+            // The pose of the machine itself is that of other sources.
+            if !is_static && child.trim_start_matches('/') == self.options.base_frame {
                 continue;
             }
             let Some(pose) = geometry::isometry_from_transform(&transform.transform) else {
@@ -134,14 +180,36 @@ impl LidarOdometry {
         }
     }
 
-    /// Takes a cloud; `None` if it gives no pose, which is counted by reason.
-    pub fn on_cloud(&mut self, topic: &str, message: &PointCloud2) -> Option<ScanResult> {
+    /// Takes a sample of a gyroscope, and gives the pose of a scan that waited for it.
+    pub fn on_imu(&mut self, topic: &str, imu: &Imu) -> Option<Registered> {
+        let taken = (self.motions).on_imu(imu, &self.options.base_frame, &mut self.mounts);
+        if let Err(text) = taken {
+            self.counts.imu_refused += 1;
+            self.refusals.add(topic, "imu_refused", || text);
+        }
+        self.register_if_complete()
+    }
+
+    /// Takes a pose of wheel odometry, and gives the pose of a scan that waited for it.
+    pub fn on_wheels(&mut self, topic: &str, wheels: &Odometry) -> Option<Registered> {
+        let taken = (self.motions).on_wheels(wheels, &self.options.base_frame, &mut self.mounts);
+        if let Err(text) = taken {
+            self.counts.wheels_refused += 1;
+            self.refusals.add(topic, "wheels_refused", || text);
+        }
+        self.register_if_complete()
+    }
+
+    /// Takes a cloud, and gives the poses of scans that need not wait for other sensors: those of clouds before and of this
+    /// one. Clouds without a pose are counted by reason. `tag` returns with the pose.
+    pub fn on_cloud(&mut self, topic: &str, message: &PointCloud2, tag: i64) -> Vec<Registered> {
         self.counts.clouds_in += 1;
-        match self.register(topic, message) {
-            Ok(result) => {
-                self.count(&result);
-                self.last = Some(result.clone());
-                Some(result)
+        match self.read(topic, message, tag) {
+            Ok(scan) => {
+                let before = self.finish();
+                self.waiting = Some(scan);
+                let now = self.register_if_complete();
+                before.into_iter().chain(now).collect()
             }
             Err((reason, text)) => {
                 match reason {
@@ -150,27 +218,73 @@ impl LidarOdometry {
                     _ => self.counts.clouds_malformed += 1,
                 }
                 self.refusals.add(topic, reason, || text);
+                Vec::new()
+            }
+        }
+    }
+
+    /// The pose of the scan that waits, without further samples of other sensors.
+    pub fn finish(&mut self) -> Option<Registered> {
+        let scan = self.waiting.take()?;
+        let result = self.register(&scan)?;
+        self.count(&result);
+        self.last = Some(result.clone());
+        Some(Registered {
+            tag: scan.tag,
+            result,
+        })
+    }
+
+    fn register_if_complete(&mut self) -> Option<Registered> {
+        let (_, end_ns) = self.waiting.as_ref()?.scan().span_ns();
+        match self.motions.is_awaited(end_ns) {
+            true => None,
+            false => self.finish(),
+        }
+    }
+
+    fn register(&mut self, scan: &ReadScan) -> Option<ScanResult> {
+        let (first_ns, end_ns) = scan.scan().span_ns();
+        let before_ns = self.last.as_ref().map(|last| last.end_ns);
+        let rates = before_ns.map(|before_ns| self.motions.rates(first_ns.min(before_ns), end_ns));
+        let rates = rates.unwrap_or_default();
+        let motion = before_ns.and_then(|before_ns| self.motions.wheels(before_ns, end_ns));
+        self.counts.scans_with_imu += u64::from(!rates.is_empty());
+        self.counts.scans_with_wheels += u64::from(motion.is_some());
+        let prior = Prior {
+            motion,
+            rates: &rates,
+        };
+        match self.core.register(&scan.scan(), &prior) {
+            Ok(result) => Some(result),
+            Err(error) => {
+                self.counts.clouds_malformed += 1;
+                (self.refusals).add(&scan.topic, "clouds_malformed", || error.to_string());
                 None
             }
         }
     }
 
-    fn register(
+    fn read(
         &mut self,
         topic: &str,
         message: &PointCloud2,
-    ) -> Result<ScanResult, (&'static str, String)> {
+        tag: i64,
+    ) -> Result<ReadScan, (&'static str, String)> {
         let options = &self.options;
         let malformed = |error: &dyn std::fmt::Display| ("clouds_malformed", error.to_string());
         let time = options.deskew.then_some(&options.time);
         let max_points = options.max_cloud_points;
         let times = CloudTimes::read(topic, message, max_points, time, &mut self.notes)
             .map_err(|error| malformed(&error))?;
-        if let Some(last) = &self.last
-            && times.last_ns <= last.end_ns
+        let waiting_ns = self.waiting.as_ref().map(|scan| scan.scan().span_ns().1);
+        let last_ns = waiting_ns.or(self.last.as_ref().map(|last| last.end_ns));
+        if let Some(last_ns) = last_ns
+            && times.last_ns <= last_ns
         {
-            if last.end_ns.saturating_sub(times.last_ns) > CLOCK_JUMP_NS {
+            if last_ns.saturating_sub(times.last_ns) > CLOCK_JUMP_NS {
                 // A log that loops: another drive.
+                (self.waiting, self.last) = (None, None);
                 self.core = Core::new(OdometryOptions {
                     lattice: options.lattice,
                 });
@@ -203,17 +317,17 @@ impl LidarOdometry {
             .filter(|(_, p)| is_kept(p))
             .map(|(i, p)| (i, (mount * Point3::from(p)).coords))
             .unzip();
-        let times_ns: Option<Vec<i64>> = times.times_ns.as_ref().map(|times| {
+        let times_ns = times.times_ns.as_ref().map(|times| {
             let of_kept = kept.iter().filter_map(|i| times.get(*i));
             of_kept.copied().collect()
         });
-        let scan = Scan {
-            points_m: &points_m,
-            times_ns: times_ns.as_deref(),
+        Ok(ReadScan {
+            topic: topic.to_owned(),
+            points_m,
+            times_ns,
             stamp_ns: times.stamp_ns,
-        };
-        let registered = self.core.register(&scan, &Prior::default());
-        registered.map_err(|error| malformed(&error))
+            tag,
+        })
     }
 
     fn count(&mut self, result: &ScanResult) {

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use lattice_core::odometry::{LostCause, ScanResult, Verdict};
 use lattice_msgs::nav_msgs::{Odometry, Path};
-use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::sensor_msgs::{Imu, PointCloud2};
 use lattice_msgs::tf2_msgs::TFMessage;
 
 use super::parameters::Settings;
@@ -24,11 +24,15 @@ use lattice_runtime::{
 enum Event {
     Cloud(Arc<PointCloud2>),
     Transforms(Arc<TFMessage>, bool),
+    Imu(Arc<Imu>),
+    Wheels(Arc<Odometry>),
     Finish,
 }
 
-/// Topic of the clouds.
+/// Topics of the clouds, of a gyroscope, and of wheel odometry.
 const POINTS: &str = "points";
+const IMU: &str = "imu";
+const WHEELS: &str = "wheel_odometry";
 
 /// Starts the node.
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
@@ -36,10 +40,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let settings = Settings::from_params(node.params())?;
     let options = settings.odometry;
     let taken = format!(
-        "clouds: {POINTS}; poses: {} in {}; transforms: /tf, /tf_static",
+        "clouds: {POINTS}; motion: {IMU}, {WHEELS}; poses: {} in {}; transforms: /tf, /tf_static",
         options.base_frame, options.odom_frame
     );
-    let lost = Arc::new(AtomicU64::new(0));
+    let (lost, motion_lost) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0)));
     let losses = Losses::default();
     let mut shell = Shell {
         outputs: Outputs::open(&node, options.publish_tf)?,
@@ -47,6 +51,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         machine: LidarOdometry::new(options),
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
+        motion_lost: Arc::clone(&motion_lost),
         losses: losses.clone(),
         report_file: settings.report_file,
     };
@@ -67,6 +72,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let is_raw = |topic: &str| !topic.ends_with("/points_enu") && !topic.ends_with("/map_centers");
     node.expect_publishers(&clouds, "the sensor's driver", None, is_raw);
     losses.watch(&clouds);
+    let on_imu = inbox.counting(&motion_lost, Event::Imu, |_| 0);
+    let on_wheels = inbox.counting(&motion_lost, Event::Wheels, |_| 0);
+    let motion = (
+        node.subscribe(IMU, Qos::INS, SubscriptionExecutor::Shared, on_imu)?,
+        node.subscribe(WHEELS, Qos::INS, SubscriptionExecutor::Shared, on_wheels)?,
+    );
     let mut transforms = Vec::new();
     for (topic, qos, is_static) in [
         ("/tf", Qos::TF, false),
@@ -83,7 +94,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }
     log::info!("{taken}");
     Ok(Box::new(move || {
-        drop((clouds, transforms));
+        drop((clouds, motion, transforms));
         compute.finish_with(Event::Finish);
         Box::new(())
     }))
@@ -120,6 +131,7 @@ struct Shell {
     diagnostics: Diagnostics,
     /// Clouds that found the inbox full, and losses before it.
     lost: Arc<AtomicU64>,
+    motion_lost: Arc<AtomicU64>,
     losses: Losses,
     report_file: String,
 }
@@ -128,15 +140,35 @@ impl Shell {
     fn on(&mut self, event: Event) {
         match event {
             Event::Cloud(cloud) => {
-                let result = self.machine.on_cloud(POINTS, &cloud);
-                if let Some(result) = &result {
-                    self.publish(result);
+                let (refused, found) = (self.refused(), self.machine.on_cloud(POINTS, &cloud, 0));
+                found
+                    .into_iter()
+                    .for_each(|found| self.publish(&found.result));
+                if self.refused() > refused {
+                    self.diagnose(None);
                 }
-                self.diagnose(result.as_ref());
+            }
+            Event::Imu(imu) => {
+                let found = self.machine.on_imu(IMU, &imu);
+                found
+                    .into_iter()
+                    .for_each(|found| self.publish(&found.result));
+            }
+            Event::Wheels(wheels) => {
+                let found = self.machine.on_wheels(WHEELS, &wheels);
+                found
+                    .into_iter()
+                    .for_each(|found| self.publish(&found.result));
             }
             Event::Transforms(message, is_static) => self.machine.on_tf(&message, is_static),
             Event::Finish => self.finish(),
         }
+    }
+
+    /// Clouds that gave no pose.
+    fn refused(&self) -> u64 {
+        let counts = self.machine.counts();
+        counts.clouds_malformed + counts.clouds_no_mount + counts.clouds_out_of_order
     }
 
     fn publish(&mut self, result: &ScanResult) {
@@ -157,12 +189,14 @@ impl Shell {
         for error in published.into_iter().filter_map(Result::err) {
             log::debug!("not published: {error}");
         }
+        self.diagnose(Some(result));
     }
 
     fn report(&self) -> OdometryReport {
         OdometryReport {
             counts: self.machine.counts().clone(),
             clouds_inbox_full: self.lost.load(Ordering::Relaxed) + self.losses.overrun(),
+            motion_inbox_full: self.motion_lost.load(Ordering::Relaxed),
             clouds_lost_on_network: self.losses.on_network(),
             undecodable: self.losses.undecodable(),
             refusals: self.machine.refusals().to_vec(),
@@ -198,6 +232,10 @@ impl Shell {
     }
 
     fn finish(&mut self) {
+        let found = self.machine.finish();
+        found
+            .into_iter()
+            .for_each(|found| self.publish(&found.result));
         let report = self.report();
         let counts = &report.counts;
         log::info!(

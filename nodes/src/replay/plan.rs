@@ -42,6 +42,8 @@ pub struct TopicPlan {
     pub base_frame: String,
     /// Cloud topic whose scans give the poses, by lidar odometry: the log has no others.
     pub odometry: Option<usize>,
+    /// Topic of a gyroscope for lidar odometry.
+    pub imu: Option<usize>,
     /// Delay with which poses come late in the log, in nanoseconds.
     pub pose_delay_ns: i64,
     /// Static transforms that come after the first cloud, and hold from the beginning.
@@ -121,6 +123,7 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
         map_frame,
         base_frame: poses.base_frame,
         odometry: poses.odometry,
+        imu: poses.imu,
         pose_delay_ns: 0,
         late_statics: TFMessage::default(),
         choices: Vec::new(),
@@ -154,7 +157,13 @@ fn said(bag: &BagReader, plan: &TopicPlan) -> Vec<String> {
         _ => names(|role| matches!(role, Role::Ins(_))),
     };
     let poses = match scans {
-        Some(scans) => format!("none in the log; lidar odometry on {}", scans.name),
+        Some(scans) => {
+            let imu = plan.imu.and_then(|topic| bag.topics().get(topic));
+            let imu = imu.map_or(String::new(), |imu| {
+                format!(" with the gyroscope of {}", imu.name)
+            });
+            format!("none in the log; lidar odometry on {}{imu}", scans.name)
+        }
         None => poses,
     };
     let TopicPlan {

@@ -2,6 +2,7 @@
 
 use lattice_bag::BagReader;
 use lattice_msgs::RosMessage;
+use lattice_msgs::sensor_msgs::Imu;
 use lattice_msgs::tf2_msgs::TFMessage;
 
 use super::plan::{TopicWishes, find};
@@ -39,6 +40,8 @@ pub(super) struct Poses {
     pub base_frame: String,
     /// Cloud topic of lidar odometry, where the log has no poses.
     pub odometry: Option<usize>,
+    /// Topic of a gyroscope for it.
+    pub imu: Option<usize>,
 }
 
 /// Poses, and the reason for which others come before them.
@@ -127,7 +130,7 @@ impl Log<'_> {
             return Ok(tf);
         }
         if worse.is_empty() {
-            return Ok(self.of_scans());
+            return self.of_scans();
         }
         // Refused by name, pose by pose.
         let (_, poses, _) = worse.remove(0);
@@ -191,6 +194,7 @@ impl Log<'_> {
                 frame,
                 base_frame: base.unwrap_or_else(|| BASE.to_owned()),
                 odometry: None,
+                imu: None,
             },
             match (unusable, connected) {
                 (Some(why), _) => Err(why.to_owned()),
@@ -240,7 +244,7 @@ impl Log<'_> {
     }
 
     /// Poses by lidar odometry, of the machine where transforms connect it with clouds, else of a sensor.
-    fn of_scans(&self) -> Poses {
+    fn of_scans(&self) -> Result<Poses, TopicError> {
         let best = self.clouds.iter().max_by_key(|cloud| {
             let is_carried = |base: &String| self.tree.connects(base, &cloud.frame);
             let is_carried = self.known_base().is_some_and(|base| is_carried(&base));
@@ -254,13 +258,27 @@ impl Log<'_> {
         let base = self
             .known_base()
             .filter(|base| self.tree.connects(base, frame));
-        Poses {
+        let base_frame = base.unwrap_or_else(|| self.tree.static_root(frame));
+        let imu = self.gyroscope(&base_frame)?;
+        Ok(Poses {
             source: InsSource::Odometry,
             topics: Vec::new(),
             frame: ODOM.to_owned(),
-            base_frame: base.unwrap_or_else(|| self.tree.static_root(frame)),
+            base_frame,
             odometry: topic,
-        }
+            imu,
+        })
+    }
+
+    /// The Imu with the most samples that transforms connect with the machine.
+    fn gyroscope(&self, base: &str) -> Result<Option<usize>, TopicError> {
+        let candidates = survey::poses(self.bag, Imu::TYPE)?;
+        let connected = candidates
+            .iter()
+            .filter(|imu| self.tree.connects(base, &imu.frame));
+        let best =
+            connected.max_by_key(|imu| (self.count(imu.topic), std::cmp::Reverse(imu.topic)));
+        Ok(best.map(|best| best.topic))
     }
 
     /// Poses by transforms alone, from a frame of the world to the machine.
@@ -289,6 +307,7 @@ impl Log<'_> {
                 frame: map_frame,
                 base_frame,
                 odometry: None,
+                imu: None,
             })
     }
 

@@ -6,7 +6,7 @@ use lattice_bag::{BagReader, ReadOptions};
 use lattice_core::odometry::{ScanResult, Verdict};
 use lattice_msgs::cdr;
 use lattice_msgs::nav_msgs::Odometry;
-use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::sensor_msgs::{Imu, PointCloud2};
 use lattice_msgs::tf2_msgs::TFMessage;
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ use super::plan::TopicPlan;
 use super::topics::{Role, TopicError};
 use crate::enu_transformer::Refusal;
 use crate::lidar_odometry::{
-    LidarOdometry, LidarOdometryOptions, OdometryCounts, PAUSE_NS, odometry_message,
+    LidarOdometry, LidarOdometryOptions, OdometryCounts, PAUSE_NS, Registered, odometry_message,
 };
 
 /// Odometry of a replay.
@@ -24,6 +24,8 @@ pub struct ScanPosesReport {
     pub topic: String,
     /// Scans by verdict, and length of the path.
     pub counts: OdometryCounts,
+    /// Topic of the gyroscope; empty: none.
+    pub imu_topic: String,
     /// Scans that are `OK` in the submap that is mapped.
     pub scans_mapped: u64,
     /// Scans that are `OK` in submaps whose place in the mapped one is unknown.
@@ -133,20 +135,26 @@ impl ScanPoses {
         let (odom_frame, base_frame) = (options.odom_frame.clone(), options.base_frame.clone());
         let mut machine = LidarOdometry::new(options);
         machine.on_tf(&plan.late_statics, true);
+        let imu_name = plan.imu.and_then(|topic| bag.topics().get(topic));
+        let imu_name = imu_name.map_or("", |topic| &topic.name);
+        let mut topics = plan.names(bag, |role| !matches!(role, Role::Ins(_)));
+        topics.extend(plan.imu.map(|_| imu_name.to_owned()));
         let read = ReadOptions {
-            topics: Some(plan.names(bag, |role| !matches!(role, Role::Ins(_)))),
+            topics: Some(topics),
             end_ns,
             ..ReadOptions::default()
         };
         let mut scans = BTreeMap::new();
+        let mut keep = |found: Vec<Registered>| {
+            scans.extend(found.into_iter().map(|found| (found.tag, found.result)));
+        };
         for message in bag.messages(&read)? {
             let message = message?;
             match plan.roles.get(&message.topic) {
                 Some(Role::Cloud) if message.topic == topic => {
                     // What does not decode is counted when it is mapped.
                     if let Ok(cloud) = cdr::from_slice::<PointCloud2>(&message.data) {
-                        let result = machine.on_cloud(name, &cloud);
-                        scans.extend(result.map(|result| (message.log_time_ns, result)));
+                        keep(machine.on_cloud(name, &cloud, message.log_time_ns));
                     }
                 }
                 Some(Role::Transforms(is_static)) => {
@@ -154,10 +162,16 @@ impl ScanPoses {
                         machine.on_tf(&transforms, *is_static);
                     }
                 }
+                _ if Some(message.topic) == plan.imu => {
+                    if let Ok(imu) = cdr::from_slice::<Imu>(&message.data) {
+                        keep(machine.on_imu(imu_name, &imu).into_iter().collect());
+                    }
+                }
                 _ => {}
             }
             progress(message.log_time_ns);
         }
+        keep(machine.finish().into_iter().collect());
         let mut in_submaps: BTreeMap<u32, u64> = BTreeMap::new();
         for scan in scans.values().filter(|scan| scan.verdict == Verdict::Ok) {
             *in_submaps.entry(scan.submap).or_default() += 1;
@@ -168,6 +182,7 @@ impl ScanPoses {
         Ok(Self {
             report: ScanPosesReport {
                 topic: name.to_owned(),
+                imu_topic: imu_name.to_owned(),
                 counts: machine.counts().clone(),
                 scans_mapped,
                 scans_elsewhere: in_submaps.values().sum::<u64>() - scans_mapped,

@@ -10,7 +10,7 @@ use lattice_core::lattice::LatticeKind;
 use lattice_msgs::RosMessage;
 use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use lattice_msgs::lattice::{ClearBoxRequest, LatticeMap, LatticeMapUpdate};
-use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::sensor_msgs::{Imu, PointCloud2};
 use lattice_nodes::executables;
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::start::Finish;
@@ -282,6 +282,31 @@ fn messages_that_find_an_inbox_full_are_counted_each() {
         };
     }
     node.ends_with(&[("messages_in", sent - refused), ("inbox_full", refused)]);
+}
+
+#[test]
+fn motion_that_finds_an_inbox_full_is_counted() {
+    let node = Driven::start("lidar_odometry", "odometry", &["inbox_events:=1"]);
+    let mut imu = Imu::default();
+    imu.angular_velocity.x = f64::NAN;
+    let (mut sent, mut full) = (0, 0);
+    while full == 0 {
+        node.publish("imu", Qos::reliable(500), &vec![imu.clone(); 200]);
+        sent += 200;
+        full = loop {
+            // Each cloud has the numbers published.
+            node.publish("points", Qos::SENSOR, &[cloud("nowhere", 5, &[[1.0; 3]])]);
+            let status = node.stated.recv_timeout(PATIENCE).unwrap();
+            let value = |key: &str| {
+                let found = status.values.iter().find(|value| value.key == key);
+                found.map_or(0, |found| found.value.parse::<u64>().unwrap())
+            };
+            if value("imu_refused") + value("motion_inbox_full") == sent {
+                break value("motion_inbox_full");
+            }
+        };
+    }
+    node.ends_with(&[("imu_refused", sent - full), ("motion_inbox_full", full)]);
 }
 
 #[test]

@@ -6,13 +6,16 @@ use lattice_bag::{BagReader, BagWriter, Storage, TopicSpec, WriterOptions};
 use lattice_core::lattice::LatticeKind;
 use lattice_core::odometry::Verdict;
 use lattice_lab::simulate::drive::{Drive, DriveScan, DriveScene};
+use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::cdr;
-use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::geometry_msgs;
+use lattice_msgs::nav_msgs::Odometry;
+use lattice_msgs::sensor_msgs::{Imu, PointCloud2};
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lidar_odometry::{LidarOdometry, LidarOdometryOptions};
 use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
-use lattice_test::clouds::{cloud, timed_cloud};
+use lattice_test::clouds::{cloud, odometry, timed_cloud};
 use lattice_test::maps;
 
 const START_NS: i64 = 1_700_000_000_000_000_000;
@@ -44,8 +47,9 @@ fn every_cloud_is_counted_once() {
     let mut newest = None;
     for number in 30..60 {
         let cloud = message(&drive.scan(number), 0);
-        let result = odometry.on_cloud("points", &cloud).unwrap();
-        verdicts[match result.verdict {
+        let found = odometry.on_cloud("points", &cloud, number);
+        assert_eq!((found.len(), found[0].tag), (1, number));
+        verdicts[match found[0].result.verdict {
             Verdict::Ok => 0,
             Verdict::Weak(_) => 1,
             Verdict::Lost(_) => 2,
@@ -64,23 +68,20 @@ fn every_cloud_is_counted_once() {
 
     // A cloud that comes again, one of another frame, one whose bytes are short.
     let mut newest = newest.unwrap();
-    assert!(odometry.on_cloud("points", &newest).is_none());
+    assert!(odometry.on_cloud("points", &newest, 0).is_empty());
     newest.header.stamp.sec += 1;
     let mut short = newest.clone();
     short.data.truncate(100);
-    assert!(odometry.on_cloud("points", &short).is_none());
+    assert!(odometry.on_cloud("points", &short, 0).is_empty());
     newest.header.frame_id = "mast".into();
-    assert!(odometry.on_cloud("points", &newest).is_none());
+    assert!(odometry.on_cloud("points", &newest, 0).is_empty());
     // Three points.
     let few = cloud("lidar", START_NS + 6_100_000_000, &[[1.0, 0.0, 0.0]; 3]);
-    assert!(odometry.on_cloud("points", &few).is_some());
+    assert_eq!(odometry.on_cloud("points", &few, 0).len(), 1);
     // A place that the map does not show.
     let elsewhere = Drive::new(DriveScene::Town, 1).scan(62);
-    assert!(
-        odometry
-            .on_cloud("points", &message(&elsewhere, 0))
-            .is_some()
-    );
+    let found = odometry.on_cloud("points", &message(&elsewhere, 0), 0);
+    assert_eq!(found.len(), 1);
 
     let counts = odometry.counts();
     let once = [
@@ -109,7 +110,7 @@ fn a_tunnel_is_weak_and_then_lost() {
     let drive = Drive::new(DriveScene::Tunnel, 1);
     for number in 50..130 {
         let cloud = message(&drive.scan(number), 0);
-        odometry.on_cloud("points", &cloud).unwrap();
+        odometry.on_cloud("points", &cloud, number);
     }
     let counts = odometry.counts();
     assert!(counts.scans_ok > 10, "{counts:?}");
@@ -119,6 +120,93 @@ fn a_tunnel_is_weak_and_then_lost() {
         counts.scans_ok + counts.scans_weak + counts.scans_lost(),
         counts.clouds_in
     );
+}
+
+/// A gyroscope's sample of a drive, from the true poses 5 ms before and after.
+fn imu(drive: &Drive, time_ns: i64) -> Imu {
+    let [before, after] = [-5_000_000, 5_000_000].map(|ns| drive.pose(time_ns + ns).rotation);
+    let rate = (before.inverse() * after).scaled_axis() / 0.01;
+    let mut imu = Imu::default();
+    imu.header.stamp = Time::from_ns(START_NS + time_ns);
+    imu.header.frame_id = "lidar".into();
+    imu.angular_velocity = geometry_msgs::Vector3 {
+        x: rate.x,
+        y: rate.y,
+        z: rate.z,
+    };
+    imu
+}
+
+/// Wheel odometry of a drive, 1 % too short.
+fn wheels(drive: &Drive, time_ns: i64) -> Odometry {
+    let mut pose = drive.pose(time_ns);
+    pose.translation.vector *= 0.99;
+    let mut wheels = odometry(START_NS + time_ns, &pose);
+    wheels.child_frame_id = "lidar".into();
+    wheels
+}
+
+#[test]
+fn a_scan_waits_for_the_motion_to_its_end_and_is_predicted_by_it() {
+    let mut found = of_lidar();
+    let drive = Drive::new(DriveScene::Gap, 1);
+    let numbers: Vec<i64> = drive.scans().collect();
+    let gap = numbers.windows(2).position(|pair| pair[1] > pair[0] + 1);
+    let gap = gap.unwrap();
+    let numbers = &numbers[gap - 25..gap + 4];
+    let mut truth = None;
+    let mut now_ns = (numbers[0] - 1) * 100_000_000;
+    for &number in numbers {
+        let scan = drive.scan(number);
+        // The cloud comes when the motion is known up to 20 ms before its end.
+        while now_ns < scan.end_ns - 20_000_000 {
+            assert!(found.on_imu("imu", &imu(&drive, now_ns)).is_none());
+            assert!(found.on_wheels("wheels", &wheels(&drive, now_ns)).is_none());
+            now_ns += 10_000_000;
+        }
+        assert!(
+            found
+                .on_cloud("points", &message(&scan, 0), number)
+                .is_empty()
+        );
+        let mut registered = None;
+        while registered.is_none() {
+            assert!(now_ns <= scan.end_ns + 10_000_000);
+            found.on_imu("imu", &imu(&drive, now_ns));
+            registered = found.on_wheels("wheels", &wheels(&drive, now_ns));
+            now_ns += 10_000_000;
+        }
+        let result = registered.unwrap().result;
+        let pose = drive.pose(scan.end_ns);
+        let start = truth.get_or_insert(pose);
+        let error = result.odom_from_base.inverse() * (start.inverse() * pose);
+        let error_m = error.translation.vector.norm();
+        assert!(error_m < 0.1, "scan {number}: {error_m} m");
+    }
+    let counts = found.counts();
+    let scans = numbers.len() as u64;
+    assert_eq!(
+        (counts.scans_with_imu, counts.scans_with_wheels),
+        (scans - 1, scans - 1)
+    );
+    assert_eq!(
+        (counts.scans_ok + counts.lost_one_place, counts.submaps),
+        (scans, 1)
+    );
+
+    // A last cloud whose motion does not come.
+    let last = drive.scan(numbers[numbers.len() - 1] + 1);
+    assert!(found.on_cloud("points", &message(&last, 0), 7).is_empty());
+    assert_eq!(found.finish().unwrap().tag, 7);
+    assert!(found.finish().is_none());
+    let mut wrong = imu(&drive, now_ns);
+    wrong.angular_velocity.x = f64::NAN;
+    found.on_imu("imu", &wrong);
+    let mut wrong = wheels(&drive, now_ns);
+    wrong.child_frame_id = "wheel".into();
+    found.on_wheels("wheels", &wrong);
+    let counts = found.counts();
+    assert_eq!((counts.imu_refused, counts.wheels_refused), (1, 1));
 }
 
 /// A log of clouds alone: one room, and then a street.
