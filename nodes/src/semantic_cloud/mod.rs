@@ -19,13 +19,14 @@ pub use crate::camera::{
     Camera, CameraError, Content, ImageError, ImageView, LabelSet, SHARES, Share, SoftLabels,
 };
 pub use counts::{CloudCounts, CloudReport, PointCounts};
-pub use options::CloudOptions;
+pub use options::{CloudOptions, LabelSource};
 pub use parameters::declare;
 pub use project::PointOptions;
 pub use waiting::{PairOptions, Stream};
 
 use std::sync::Arc;
 
+use lattice_core::registration::UNLABELED;
 use lattice_msgs::sensor_msgs::{CameraInfo, CompressedImage, Image, PointCloud2};
 use lattice_msgs::vision_msgs::LabelInfo;
 
@@ -55,6 +56,8 @@ pub struct SemanticCloud {
     /// Camera rays, built with its first image.
     rays: Vec<[f32; 2]>,
     label_info: Option<Arc<LabelInfo>>,
+    /// True if label images may come.
+    has_label_source: bool,
     classes: Classes,
     counts: CloudCounts,
     problem: Option<String>,
@@ -71,6 +74,7 @@ impl SemanticCloud {
             camera: None,
             rays: Vec::new(),
             label_info: None,
+            has_label_source: true,
             counts: CloudCounts::default(),
             problem: None,
         }
@@ -85,6 +89,20 @@ impl SemanticCloud {
             self.on_camera_info(info);
         }
         self.names().into_iter().collect()
+    }
+
+    /// Notes whether label images may come; initially they may.
+    pub fn set_label_source(&mut self, has_label_source: bool) {
+        self.has_label_source = has_label_source;
+    }
+
+    /// True if clouds are made without labels.
+    pub fn is_unlabelled(&self) -> bool {
+        match self.options.labels {
+            LabelSource::Auto => !self.has_label_source && self.counts.labels_in == 0,
+            LabelSource::Image => false,
+            LabelSource::None => true,
+        }
     }
 
     /// Handles an image.
@@ -112,7 +130,12 @@ impl SemanticCloud {
                 return Vec::new();
             }
         };
-        for (stream, reason) in self.waiting.push(stream, image) {
+        let unknown = (stream == Stream::Depth && self.is_unlabelled()).then(|| no_class(&image));
+        let mut dropped = self.waiting.push(stream, image);
+        if let Some(unknown) = unknown {
+            dropped.extend(self.waiting.push(Stream::Labels, unknown));
+        }
+        for (stream, reason) in dropped {
             self.drop_image(stream, reason);
         }
         self.serve(false)
@@ -292,6 +315,9 @@ impl SemanticCloud {
     }
 
     fn drop_image(&mut self, stream: Stream, reason: Left) {
+        if stream == Stream::Labels && self.is_unlabelled() {
+            return;
+        }
         let reason = match reason {
             Left::NoPartner if self.camera.is_none() => "no_camera_info",
             Left::NoPartner => "no_partner",
@@ -299,6 +325,13 @@ impl SemanticCloud {
             Left::TimeJump => "time_jump",
         };
         self.counts.drop_one(stream.name(), reason);
+        if (stream, reason) == (Stream::Depth, "no_partner") && self.counts.clouds_out == 0 {
+            let difference_s = self.options.pair.max_difference_ns as f64 * 1e-9;
+            self.problem = Some(format!(
+                "depth: no label image within {difference_s} s of its stamp (`max_stamp_difference_s`, `queue_size`); \
+                 `labels: none` makes clouds without labels"
+            ));
+        }
     }
 
     fn refuse(&mut self, topic: &str, reason: &str, problem: &str) {
@@ -306,4 +339,17 @@ impl SemanticCloud {
         self.problem = Some(format!("{topic}: {problem}"));
         log::debug!("{topic} rejected: {problem}");
     }
+}
+
+/// A label image of one pixel without a class, for a depth image.
+fn no_class(depth: &Image) -> Arc<Image> {
+    Arc::new(Image {
+        header: depth.header.clone(),
+        width: 1,
+        height: 1,
+        encoding: "mono16".into(),
+        is_bigendian: 0,
+        step: 2,
+        data: UNLABELED.to_le_bytes().to_vec().into(),
+    })
 }

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use lattice_msgs::sensor_msgs::{CameraInfo, CompressedImage, Image, PointCloud2};
@@ -23,6 +23,8 @@ use lattice_runtime::{
 
 /// Limit of stored arrival times of depth images.
 const MAX_ARRIVALS: usize = 256;
+/// Topic of label images.
+const LABELS: &str = "labels/image";
 /// Topic of colour images.
 const COLOR: &str = "rgb/image_rect_color";
 
@@ -57,8 +59,11 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         None => None,
     };
     let view = ready.as_ref().map(LoadedNetwork::view);
+    let has_label_source = Arc::new(AtomicBool::new(false));
     let mut compute_state = ComputeState {
         machine: SemanticCloud::new(settings.cloud.clone()),
+        has_label_source: Arc::clone(&has_label_source),
+        is_unlabelled: false,
         points: node.publisher("points", Qos::SCANS)?,
         label_info: node.publisher("label_info", Qos::LATCHED)?,
         network: view.map(|view| Outputs::new(&node, view)).transpose()?,
@@ -77,7 +82,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         compute_state.on(event)
     })?;
     let inbox = compute.inbox();
-    let mut inputs = subscribe(&node, &inbox, &lost, &settings)?;
+    let mut inputs = subscribe(&node, &inbox, &lost, &settings, &has_label_source)?;
     let mut network = None;
     if let Some(ready) = ready {
         let tell = segmenter::hand_over(&inbox, &lost, Event::Network);
@@ -119,6 +124,7 @@ fn subscribe(
     inbox: &Inbox<Event>,
     lost: &Arc<AtomicU64>,
     settings: &Settings,
+    has_label_source: &Arc<AtomicBool>,
 ) -> Result<Vec<Subscription>, NodeError> {
     let bytes = |image: &Arc<Image>| size_of::<Image>() + image.data.len();
     let packed = |image: &Arc<CompressedImage>| size_of::<CompressedImage>() + image.data.len();
@@ -141,13 +147,15 @@ fn subscribe(
         )?
     }];
     if settings.network.is_none() {
-        let labels = images(Stream::Labels);
-        inputs.push(node.subscribe(
-            "labels/image",
+        let labels = node.subscribe(
+            LABELS,
             Qos::SENSOR,
             SubscriptionExecutor::Dedicated,
-            labels,
-        )?);
+            images(Stream::Labels),
+        )?;
+        let joined = Arc::clone(has_label_source);
+        labels.on_publisher_joined(move || joined.store(true, Ordering::Relaxed));
+        inputs.push(labels);
         let names = inbox.counting(lost, Event::LabelInfo, |_| 0);
         inputs.push(node.subscribe(
             "labels/label_info",
@@ -192,6 +200,10 @@ fn subscribe(
 /// State of the compute thread.
 struct ComputeState {
     machine: SemanticCloud,
+    /// True once a publisher of label images was matched.
+    has_label_source: Arc<AtomicBool>,
+    /// True after the log line about clouds without labels.
+    is_unlabelled: bool,
     points: Publisher<PointCloud2>,
     label_info: Publisher<LabelInfo>,
     network: Option<Outputs>,
@@ -252,6 +264,14 @@ impl ComputeState {
     }
 
     fn arrived(&mut self, stamp_ns: i64, at: Instant) {
+        let has_label_source = self.has_label_source.load(Ordering::Relaxed);
+        self.machine.set_label_source(has_label_source);
+        if self.machine.is_unlabelled() && !self.is_unlabelled {
+            self.is_unlabelled = true;
+            log::info!(
+                "clouds have no labels: nobody publishes {LABELS}, or `labels` is none; `labels: image` waits for it"
+            );
+        }
         self.arrivals.push_back((stamp_ns, at));
         if self.arrivals.len() > MAX_ARRIVALS {
             self.arrivals.pop_front();

@@ -3,14 +3,35 @@
 use super::project::PointOptions;
 use super::waiting::PairOptions;
 use crate::camera::ClassRules;
+use crate::options::one_of;
 use lattice_runtime::params::{ParamError, Params};
 
 /// Largest settable queue of images per topic.
 const MAX_QUEUE: usize = 1000;
 
+/// Source of the labels of clouds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LabelSource {
+    /// Label images where a publisher of them is known, none otherwise.
+    Auto,
+    /// Label images, or a network: depth images wait for them.
+    Image,
+    /// Clouds without labels.
+    None,
+}
+
+/// Values of `labels`; the first is the default.
+const LABEL_SOURCES: [(&str, LabelSource); 3] = [
+    ("auto", LabelSource::Auto),
+    ("image", LabelSource::Image),
+    ("none", LabelSource::None),
+];
+
 /// Options of a [`super::SemanticCloud`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct CloudOptions {
+    /// Source of the labels.
+    pub labels: LabelSource,
     /// Matching rules of images.
     pub pair: PairOptions,
     /// Larger images are rejected, pixels.
@@ -26,6 +47,7 @@ pub struct CloudOptions {
 impl Default for CloudOptions {
     fn default() -> Self {
         Self {
+            labels: LabelSource::Auto,
             pair: PairOptions {
                 queue_size: 5,
                 max_difference_ns: 20_000_000,
@@ -66,6 +88,7 @@ impl CloudOptions {
         }
         let edge_jump = params.f64_in("edge_jump", 0.05, 0.0..=1e9)?;
         Ok(Self {
+            labels: one_of(params, "labels", &LABEL_SOURCES)?,
             pair: PairOptions {
                 queue_size: params.usize_in("queue_size", pair.queue_size, 1..=MAX_QUEUE)?,
                 max_difference_ns,

@@ -1,6 +1,6 @@
 //! Parameters of the node.
 
-use super::CloudOptions;
+use super::{CloudOptions, LabelSource};
 use crate::compute::ComputeLimits;
 use crate::segmenter::{NETWORK, NetworkSettings, SegmenterOptions};
 use crate::{options, report};
@@ -8,6 +8,7 @@ use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
+    "labels": "Source of labels: image (labels/image, or model), none (clouds without labels), auto (image where somebody publishes labels/image, else none).";
     "queue_size": "Images of each topic queued for those of the same stamp; the oldest is dropped and counted.";
     "exact_sync": "Whether the stamps of depth and labels must be equal.";
     "max_stamp_difference_s": "Largest difference between the stamps of depth and labels without exact_sync.";
@@ -53,6 +54,10 @@ impl Settings {
         if network.is_some() {
             // They are delivered with the labels.
             (cloud.pair.with_confidence, cloud.pair.with_color) = (false, false);
+            if cloud.labels == LabelSource::None {
+                return Err(params.invalid("labels", "expected auto or image beside `model`"));
+            }
+            cloud.labels = LabelSource::Image;
         }
         let compressed_color = params.bool("compressed_color", false)?;
         if compressed_color && cloud.pair.with_color && !cfg!(feature = "onnx") {

@@ -152,3 +152,46 @@ proptest! {
         prop_assert_eq!(counts.labels_in, counts.clouds_out + dropped(&machine, "labels_"));
     }
 }
+
+#[test]
+fn depth_without_a_source_of_labels_becomes_clouds_without_labels() {
+    let unlabelled = 255;
+    let mut machine = machine(CloudOptions::default());
+    machine.set_label_source(false);
+    for i in 1..4 {
+        let stamp_ns = i * PERIOD_NS;
+        assert_eq!(
+            give(&mut machine, Stream::Depth, stamp_ns, 1),
+            [(stamp_ns, unlabelled)]
+        );
+    }
+    let counts = machine.counts();
+    assert_eq!((counts.labels_in, counts.points.points_unlabelled), (0, 6));
+    // A source that comes later is waited for.
+    machine.set_label_source(true);
+    assert_eq!(give(&mut machine, Stream::Depth, 4 * PERIOD_NS, 1), []);
+    assert_eq!(
+        give(&mut machine, Stream::Labels, 4 * PERIOD_NS, 5),
+        [(4 * PERIOD_NS, 5)]
+    );
+    machine.set_label_source(false);
+    assert_eq!(
+        give(&mut machine, Stream::Depth, 5 * PERIOD_NS, 1),
+        [],
+        "it has labelled"
+    );
+    assert_eq!(dropped(&machine, ""), 0);
+}
+
+#[test]
+fn labels_by_parameter_are_waited_for_or_not() {
+    let mut none = machine(options(&[("labels", "none")]));
+    assert_eq!(give(&mut none, Stream::Depth, PERIOD_NS, 1).len(), 1);
+    let mut image = machine(options(&[("labels", "image")]));
+    image.set_label_source(false);
+    for i in 1..=6 {
+        assert_eq!(give(&mut image, Stream::Depth, i * PERIOD_NS, 1), []);
+    }
+    assert_eq!(dropped(&image, "depth_no_partner"), 1);
+    assert!(image.problem().unwrap().contains("`labels: none`"));
+}
