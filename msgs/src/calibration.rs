@@ -136,7 +136,7 @@ pub struct Calibrate;
 pub struct CalibrateRequest {
     /// False: search the whole map.
     pub has_guess: bool,
-    /// `map_from_headset_origin`, about.
+    /// Approximate `map_from_headset_origin`.
     pub guess: Pose,
     /// Refused unless the headset's; empty: whichever it is.
     pub session: String,
@@ -162,7 +162,7 @@ pub struct CalibrateAction;
 pub struct CalibrateGoal {
     /// False: search the whole map.
     pub has_guess: bool,
-    /// `map_from_headset_origin`, about.
+    /// Approximate `map_from_headset_origin`.
     pub guess: Pose,
     /// Refused unless the headset's; empty: whichever it is.
     pub session: String,

@@ -25,7 +25,7 @@ impl TestDomain {
         self.0.id()
     }
 
-    /// The domain, on loopback only unless told otherwise, over the transport that `RMW_IMPLEMENTATION`
+    /// The domain, on loopback unless set otherwise, over the transport that `RMW_IMPLEMENTATION`
     /// names.
     pub fn transport(&self) -> Network {
         Network {

@@ -14,7 +14,7 @@ pub fn map_cloud(flat: &Flat, stamp_ns: i64) -> PointCloud2 {
     labelled_cloud("map", stamp_ns, &points)
 }
 
-/// A look as the headset sends it, after `axes` has been applied to each point.
+/// A scan as the headset sends it, after `axes` has been applied to each point.
 pub fn headset_cloud(
     look: &SemanticCloud,
     stamp_ns: i64,

@@ -206,7 +206,7 @@ impl FreeSpaceMap {
         &self.traversal.lattice
     }
 
-    /// Lattice of the free cells; its lattice point 0 is the datum too.
+    /// Lattice of the free cells, with the datum at its lattice point 0.
     pub fn free_lattice(&self) -> &Lattice {
         match &self.free {
             Free::Hit | Free::Fine => self.lattice(),

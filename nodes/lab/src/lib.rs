@@ -34,7 +34,7 @@ pub fn pool(threads: usize) -> Result<rayon::ThreadPool, AnyError> {
     Ok(pool.build()?)
 }
 
-/// Names the file that an error is about.
+/// Adds the path of a file to its error.
 fn at<E: Display>(path: &Path) -> impl Fn(E) -> AnyError + use<E> {
     let path = path.to_owned();
     move |error| format!("{}: {error}", path.display()).into()

@@ -160,7 +160,7 @@ impl EnuTransformer {
         &self.options
     }
 
-    /// Goes on with other options, except for frames, INS, origin and what is kept of poses.
+    /// Changes the options, except for frames, INS, origin and the buffer of poses.
     pub fn set_options(&mut self, options: TransformerOptions) {
         self.poses.set_max_gap_s(options.max_pose_gap_s);
         self.waiting.set_max_clouds(options.max_waiting_clouds);

@@ -53,7 +53,7 @@ pub struct TopicPlan {
 }
 
 impl TopicPlan {
-    /// Clouds of the log that the replay is about.
+    /// Clouds of the log that are replayed.
     pub fn clouds(&self, bag: &BagReader) -> u64 {
         let topics = self.topics(bag, |role| role == Role::Cloud);
         topics.map(|topic| topic.message_count).sum()

@@ -11,7 +11,7 @@ use lattice_runtime::params::Params;
 use lattice_runtime::params_file;
 use lattice_runtime::ros_args::RosArgs;
 
-/// Messages and points that a target takes, at most.
+/// Limit of messages and points that a target takes.
 const MOST: usize = 10_000;
 
 /// Frames of zstd are left to it: one of a few bytes may become gigabytes of a file.

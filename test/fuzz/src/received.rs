@@ -19,7 +19,7 @@ use lattice_nodes::map_follower::MapFollower;
 use nalgebra::Vector3;
 use serde_bytes::ByteBuf;
 
-/// Points and voxels that a target works on, at most.
+/// Limit of points and voxels that a target processes.
 const MOST: usize = 10_000;
 
 /// Decodes the bytes as the message that the first of them names; what succeeds comes back from its own

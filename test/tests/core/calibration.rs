@@ -140,7 +140,7 @@ fn what_cannot_be_used_is_refused_with_a_reason() {
     assert_eq!(few_nans.verdict, Verdict::Ok, "{}", few_nans.reason);
 }
 
-/// The points of a look for which something is so.
+/// The points of a scan that fulfil a condition.
 fn seen(scan: SourceCloud, is_so: impl Fn(&Point3<f64>, Option<u16>) -> bool) -> SourceCloud {
     let SourceCloud { cloud, sensor_m } = scan;
     let all = cloud.points_m.into_iter().zip(cloud.labels);

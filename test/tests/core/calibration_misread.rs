@@ -1,4 +1,4 @@
-//! Clouds in wrong axes, of a wrong scale or leaning: none is called certain, and the reason tells why.
+//! Clouds in wrong axes, of a wrong scale or leaning: none has the verdict OK, and the reason names the cause.
 
 use lattice_core::pose::Axes;
 use lattice_core::registration::{

@@ -48,7 +48,7 @@ impl Machines {
         assert!(ip(&format!("-n {} link set veth0 {state}", self.0[0])));
     }
 
-    /// Has both ends send packets of so many bytes at most.
+    /// Limits the packets of both ends to a number of bytes.
     pub fn set_mtu(&self, bytes: u32) {
         for name in &self.0 {
             assert!(ip(&format!("-n {name} link set veth0 mtu {bytes}")));

@@ -24,7 +24,7 @@ fn run_peer(arguments: &[&str]) -> Option<Value> {
     Some(serde_json::from_slice(&output.stdout).unwrap())
 }
 
-/// The number that the bytes spell, modulo 2^61 - 1; the peer computes it too.
+/// The number that the bytes spell, modulo 2^61 - 1, as the peer computes it.
 pub(super) fn hash(data: &[u8]) -> u64 {
     let prime = (1_u128 << 61) - 1;
     let hash = data.iter().fold(1_u128, |hash, byte| {

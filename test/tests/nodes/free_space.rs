@@ -203,7 +203,7 @@ fn free_cells_are_published_as_a_map_of_their_own() {
     assert!(at(1.0) && at(3.0) && !at(5.0) && !at(7.0));
 }
 
-/// A map of occupancy is saved, loaded by another node and goes on; what is loaded can be cleared.
+/// A map of occupancy is saved, loaded by another node and continued; loaded cells can be cleared.
 #[test]
 fn a_map_of_occupancy_is_saved_and_loaded() {
     for method in [FreeSpaceMethod::Clear, FreeSpaceMethod::Evidence] {

@@ -88,7 +88,7 @@ fn assert_close(follower: &MapFollower, mapper: &LatticeMapper) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
-    /// Whatever the order of messages and of updates, followers have the map of one who heard all.
+    /// Whatever the order of messages and of updates, followers have the map of one that received all.
     #[test]
     fn the_merged_map_is_that_of_one_mapper_that_heard_all(
         order in prop::collection::vec((0_usize..3, any::<bool>()), 5..40),

@@ -11,7 +11,7 @@ fn quoted(line: &str) -> Vec<&str> {
     line.split('`').skip(1).step_by(2).collect()
 }
 
-/// True for a file or folder of the repository, as its name tells; a file that each node has goes without one.
+/// True for a file or folder of the repository by its name; a file that each node has goes without one.
 fn is_path(text: &str) -> bool {
     let of_each_node = ["mod.rs", "node.rs", "options.rs", "parameters.rs"];
     if of_each_node.contains(&text) {

@@ -6,7 +6,7 @@ use std::fs;
 use super::root;
 use super::source::files;
 
-/// Functions with `#[test]` in a text, those of `proptest!` too.
+/// Functions with `#[test]` in a text, including those of `proptest!`.
 fn tests(text: &str) -> impl Iterator<Item = &str> {
     let after = text.split("#[test]").skip(1);
     after.filter_map(|rest| {

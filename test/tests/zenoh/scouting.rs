@@ -6,7 +6,7 @@ use lattice_test::domain::TestDomain;
 
 use super::{PATIENCE, free_endpoint, hear, network, runtime, text};
 
-/// A late joiner hears what was latched.
+/// A late joiner receives latched messages.
 fn meet(first: &str, second: &str) {
     let domain = TestDomain::take();
     let from = runtime("from", &[], &network(&domain, first, "-1"));

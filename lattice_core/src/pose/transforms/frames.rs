@@ -156,7 +156,7 @@ impl Frames {
         Ok(&mut claim.link)
     }
 
-    /// Adds a parent and returns its index; beyond the limit, the one least recently heard is dropped.
+    /// Adds a parent and returns its index; beyond the limit, the one least recently updated is dropped.
     fn add_claim(&mut self, child: usize, parent: usize, is_static: bool) -> usize {
         let protected = self.protected();
         let Some(frame) = self.frames.get_mut(child) else {

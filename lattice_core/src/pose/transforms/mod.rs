@@ -41,7 +41,7 @@ impl Default for TransformBufferOptions {
 /// Transforms of all frames by time, from `/tf` and `/tf_static`.
 ///
 /// A frame may have several parents, so a wrong publisher does not displace the right one. A lookup takes the
-/// shortest path, static transforms first. A full table drops the frame least recently heard, except those on the
+/// shortest path, static transforms first. A full table drops the frame least recently updated, except those on the
 /// path to [`keep`](Self::keep).
 #[derive(Clone, Debug)]
 pub struct TransformBuffer {

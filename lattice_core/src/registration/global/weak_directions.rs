@@ -148,7 +148,7 @@ fn variance(unit: f64, steps: &[(f64, f64)]) -> f64 {
 struct Direction {
     /// Derivative of the translation or the angle along it by a right perturbation of the pose (rho, phi).
     lever: RowVector6<f64>,
-    /// Perturbation that moves the pose by one unit along it; correlated directions move too.
+    /// Perturbation that moves the pose by one unit along it, together with correlated directions.
     motion: Vector6<f64>,
 }
 

@@ -253,7 +253,7 @@ impl CellTable {
         Some(Place::New(number))
     }
 
-    /// Removes a voxel; the last voxel takes its index, which is returned too.
+    /// Removes a voxel, and returns its index, now that of the last voxel.
     pub(crate) fn remove(&mut self, code: BlockKey) -> Option<(u32, Entry)> {
         let at = self.blocks.find(code.block())?;
         let block = self.blocks.row_mut(at)?;

@@ -187,7 +187,7 @@ impl<R: Row> Table<R> {
         }
     }
 
-    /// Removes a row; the last row takes its index, which is returned too.
+    /// Removes a row, and returns its index, now that of the last row.
     pub(crate) fn remove(&mut self, code: u64) -> Option<(u32, R)> {
         let (at, slot) = self.slot_of(code);
         if slot == FREE {

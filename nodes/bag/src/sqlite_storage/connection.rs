@@ -19,7 +19,7 @@ pub(super) enum Access {
     Strict,
     /// Reads the existing pages of a truncated database.
     Cut,
-    /// Reads the valid cells of each page, in truncated databases too.
+    /// Reads the valid cells of each page, also in truncated databases.
     Damaged,
 }
 

@@ -46,7 +46,7 @@ pub enum Evaluate {
 /// Options of `lattice evaluate calibration`.
 #[derive(Args)]
 pub struct Calibration {
-    /// Folder of the results and the report; a run that was ended goes on where it was
+    /// Folder of the results and the report; an ended run is continued
     #[arg(long)]
     out: PathBuf,
     /// PLY of a house, metres, z up, with `label` and `instance` of each face [default: a house of our own]

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Options of evaluations that consist of many trials of one method.
 #[derive(Args)]
 pub struct Many {
-    /// Folder of the results and the report; a run that was ended goes on where it was
+    /// Folder of the results and the report; an ended run is continued
     #[arg(long)]
     out: PathBuf,
     /// Seeds: trials of each kind

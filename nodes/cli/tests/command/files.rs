@@ -168,7 +168,7 @@ fn in_a_read_only_folder_old_files_stay_and_the_error_names_it() {
     set_mode(&locked, 0o755);
 }
 
-/// A mapper whose folder is read-only goes on, and says that it saves nothing.
+/// A mapper whose folder is read-only still maps, and reports that it saves nothing.
 fn a_map_that_is_not_saved_is_told(log: &str, folder: &Path) {
     let domain = LoopbackDomain::take().unwrap();
     let maps = format!("lattice_mapper:map_dir:={}", folder.display());

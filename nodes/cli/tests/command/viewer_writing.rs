@@ -21,7 +21,7 @@ use crate::viewer::{COMPLETE, Viewer, keys, map_of, scene, shown};
 /// Between two layers of centres.
 const BOX_END_M: f64 = 0.1;
 
-/// Parameters of a mapper that goes on from a map, and of a viewer.
+/// Parameters of a mapper that continues a map, and of a viewer.
 fn params(folder: &Path, map: &str, allow_write: bool) -> String {
     std::fs::copy(map, folder.join("site.lattice")).unwrap();
     let dir = folder.display();
@@ -58,7 +58,7 @@ pub fn text(socket: &mut Socket, op: &str) -> Value {
     }
 }
 
-/// Capabilities and services that the server tells of, and its answer to a call of one that it does not.
+/// Capabilities and services that the server advertises, and its answer to a call of another one.
 fn offered(url: &str) -> (Value, Vec<String>, Value) {
     let mut socket = socket(url);
     let call = [

@@ -45,7 +45,7 @@ pub struct CameraSetup {
 pub struct CameraReport {
     /// Images sent.
     pub sent: u64,
-    /// Clouds heard.
+    /// Clouds received.
     pub clouds: u64,
     /// Points of the last.
     pub points: u32,
@@ -202,7 +202,7 @@ impl CameraSetup {
     }
 }
 
-/// Processor time so far of the threads of the node and of all, s, as Linux tells it.
+/// Processor time so far of the threads of the node and of all, s, by Linux.
 fn cpu_s() -> Result<[f64; 2], AnyError> {
     let mut of_node = 0.0;
     for task in fs::read_dir("/proc/self/task")? {

@@ -17,7 +17,7 @@ const MAX_BYTES: usize = 1 << 40;
 /// Use of the rays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum RaycastMethod {
-    /// Log-odds of all cells, free ones too.
+    /// Log-odds of all cells, including free ones.
     Map,
     /// A store of voxels, from which those that rays pass through are removed.
     Clear,

@@ -51,7 +51,7 @@ impl fmt::Display for SiteSummary {
     }
 }
 
-/// Writes a survey; `progress` hears the share done, 0..1.
+/// Writes a survey; `progress` is called with the share done, 0..1.
 pub fn write_site(
     options: &SiteOptions,
     progress: &mut dyn FnMut(f64),

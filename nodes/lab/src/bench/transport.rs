@@ -38,7 +38,7 @@ pub struct TransportSetup {
 /// Result of the receiving process.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Received {
-    /// Messages heard.
+    /// Messages received.
     pub heard: u64,
     /// From the call of `publish` to the handler's: median, ms.
     pub median_ms: f64,
@@ -127,7 +127,7 @@ pub fn send(
     Ok(report)
 }
 
-/// Listens in a domain and prints what it heard, as a line for [`send`].
+/// Subscribes in a domain and prints what it received, as a line for [`send`].
 pub fn listen(setup: TransportSetup, domain: u16) -> Result<(), AnyError> {
     let (_runtime, node, _) = node(domain, "listener")?;
     let (sender, heard) = channel();

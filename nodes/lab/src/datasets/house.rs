@@ -143,7 +143,7 @@ impl From<Isometry3<f64>> for Pose {
 
 /// Simulates a house and writes it to a folder: [`MAP_FILE`], [`CLASSES_FILE`], and for each scene
 /// `NAME.ply` (further headset scans `NAME_2.ply` and so on) with `NAME.json`, a [`SceneTruth`], beside it.
-/// `progress` hears the share done, 0..1.
+/// `progress` is called with the share done, 0..1.
 pub fn write_house(
     options: &HouseOptions,
     progress: &mut dyn FnMut(f64),

@@ -123,7 +123,7 @@ impl fmt::Display for ImagesSummary {
     }
 }
 
-/// Renders images and writes them to a folder. `progress` hears the share done, 0..1.
+/// Renders images and writes them to a folder. `progress` is called with the share done, 0..1.
 pub fn write_images(
     options: &ImagesOptions,
     progress: &mut dyn FnMut(f64),

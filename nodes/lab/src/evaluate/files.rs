@@ -24,7 +24,7 @@ pub(super) fn write_cloud(
     })
 }
 
-/// Writes a look to a folder: `SCENE_SEED_map.ply` and `SCENE_SEED_cloud.ply`, as the map and the headset have them, and
+/// Writes a headset scan to a folder: `SCENE_SEED_map.ply` and `SCENE_SEED_cloud.ply`, as the map and the headset have them, and
 /// `SCENE_SEED.json` with the true `map_from_headset`, row by row.
 pub(super) fn write_look(folder: &Path, cell: &Cell, scenario: &Scenario) -> Result<(), AnyError> {
     fs::create_dir_all(folder).map_err(at(folder))?;

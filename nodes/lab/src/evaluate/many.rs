@@ -43,7 +43,7 @@ pub fn settings_of(cell_side_m: f64) -> Settings {
 /// Runs the trials of the cases whose names contain `part`, with each of `seeds`, that the results do not have
 /// yet, seed by seed, on `threads` threads.
 ///
-/// `progress` hears of trials done, of all that are left.
+/// `progress` is called with the number of trials done, and of all that are left.
 ///
 /// # Errors
 /// If no case has such a name, or a trial or its result fails.

@@ -11,7 +11,7 @@ const GATE_M: f64 = 1.0;
 pub const START: &str = "start";
 pub const OURS_TITLE: &str = "ours";
 
-/// Name, letters below a method's dots, and colour; most eyes tell the colours apart (Wong 2011).
+/// Name, letters below a method's dots, and colour, one of those that colour-blind people distinguish (Wong 2011).
 const LOOKS: [(&str, &str, RGBColor); 9] = [
     (START, "start", RGBColor(170, 170, 170)),
     ("icp", "ICP", RGBColor(86, 180, 233)),

@@ -18,7 +18,7 @@ pub fn shared(
     points_m.iter().filter(near).count() as f64 / points_m.len().max(1) as f64
 }
 
-/// Trial of a calibration, given the points that were seen and the share of them that the map has too.
+/// Trial of a calibration, given the points that were seen and the share of them in the map.
 pub fn trial(
     cell: &Cell,
     found: &Calibration,

@@ -15,7 +15,7 @@ use crate::report::{Cell, Figure, Report, Section, Table};
 const ELSEWHERE: (f64, f64) = (0.5, 15.0);
 /// Stated probabilities that are counted together.
 const DECADES: [Range<f64>; 5] = [0.1..1.0, 1e-2..0.1, 1e-3..1e-2, 1e-4..1e-3, 0.0..1e-4];
-/// Stated probabilities at which the curve of the odds is told.
+/// Stated probabilities at which the curve of the odds is given.
 const AT: [f64; 4] = [0.1, 0.01, 1e-3, 1e-4];
 /// Share that is drawn for none, and where stated ones that are less are drawn.
 const LEAST: f64 = 2e-5;

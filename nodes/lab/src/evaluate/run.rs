@@ -56,7 +56,7 @@ struct Job {
 
 /// Runs all trials of a plan that the results do not have yet, on `threads` threads.
 ///
-/// `progress` hears of trials done, of all.
+/// `progress` is called with the number of trials done, and of all.
 pub fn run(
     testbed: &Testbed,
     plan: &Plan,

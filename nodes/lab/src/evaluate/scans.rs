@@ -17,7 +17,7 @@ use crate::options::within;
 use crate::random::Stream;
 use crate::report::{Cell as Entry, Report, Section, Table};
 
-/// Cells within which the map has a point too.
+/// Largest distance, in cells, of a point that the map has as well.
 const SHARED_CELLS: f64 = 2.0;
 
 /// Two scans of a place, and how one is calibrated in the other.
@@ -94,7 +94,7 @@ impl Scans {
         Ok(widths_deg.iter().map(part).collect())
     }
 
-    /// Settings that results are kept with; scans, poses and options tell them apart.
+    /// Settings that results are stored with: scans, poses and options.
     pub fn settings(&self) -> Settings {
         let mut hash = crc32fast::Hasher::new();
         for point in self

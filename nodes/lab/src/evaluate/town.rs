@@ -16,7 +16,7 @@ use crate::simulate::town::{Lidar, Town, drive};
 const CELL_SIDE_M: f64 = 0.3;
 /// Distance within which the map has a point too, metres.
 const SHARED_M: f64 = 0.5;
-/// Share of points in both by which pairs are told apart.
+/// Share of common points that separates pairs of one place from others.
 const OVERLAP: f64 = 0.3;
 /// Distances of the scans, metres.
 const APART_M: [f64; 4] = [5.0, 10.0, 20.0, 30.0];

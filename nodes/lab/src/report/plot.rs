@@ -103,7 +103,7 @@ where
     Ok(chart)
 }
 
-/// Labels at an axis, about.
+/// Approximate number of labels at an axis.
 const TICKS: usize = 7;
 
 /// Numbers at an axis: all with as many digits as they need, or each with its own if it is logarithmic. An
@@ -124,7 +124,7 @@ fn labels<A: Ranged<ValueType = f64>>(axis: &A) -> impl Fn(&f64) -> String + use
     }
 }
 
-/// A lattice's colour, told apart by most eyes (Wong 2011).
+/// A lattice's colour, one of those that colour-blind people distinguish (Wong 2011).
 pub fn color(kind: LatticeKind) -> RGBColor {
     match kind {
         LatticeKind::Cubic => BLACK,

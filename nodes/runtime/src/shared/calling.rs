@@ -81,7 +81,7 @@ impl Client {
         &self.0.name
     }
 
-    /// Calls with little-endian CDR, encapsulation header first; the reply is CDR too. Dropping the future
+    /// Calls with little-endian CDR, encapsulation header first, and returns the reply as CDR. Dropping the future
     /// cancels the call.
     pub fn call(
         &self,

@@ -175,7 +175,7 @@ fn decimal(word: &str) -> Option<f64> {
         .flatten()
 }
 
-/// Parses a number in any usual notation, NaN and infinities too.
+/// Parses a number in any usual notation, including NaN and infinities.
 pub(super) fn number(word: &str) -> Option<f64> {
     word.parse().ok()
 }

@@ -119,8 +119,7 @@ fn requests_that_find_no_room_are_counted() {
     assert!(answered >= 1000 && lost > 0, "{answered} {lost}");
 }
 
-/// Has a server hear so many requests while it is at work on one: how many of them it answers, and how many
-/// the diagnostics say are lost.
+/// Sends requests to a server that is busy with one: the numbers of answers, and of losses in the diagnostics.
 fn answered_and_lost(requests: usize) -> (usize, usize) {
     let domain = Domain::take();
     let runtime = runtime(&domain, &[]);

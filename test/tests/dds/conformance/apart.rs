@@ -14,7 +14,7 @@ use crate::machines::Machines;
 
 const RANGE: &str = "ROS_AUTOMATIC_DISCOVERY_RANGE";
 
-/// Tells [`hears_an_echo`] what is to come of it.
+/// Environment variable with the result that [`hears_an_echo`] expects.
 const EXPECTED: &str = "LATTICE_TEST_EXPECTED";
 
 /// Time in which nobody is to be found: several announcements of 2 s.

@@ -1,4 +1,4 @@
-//! Datagrams of a stranger cost a process of ours no memory and keep no honest peer from it.
+//! Forged datagrams cost a process of ours no memory, and honest peers still reach it.
 //!
 //! The victim is an [`Echo`] with an address space of 1 GiB.
 

@@ -42,7 +42,7 @@ const DOMAIN: &str = "LATTICE_TEST_ECHO_DOMAIN";
 /// Name in `RMW_IMPLEMENTATION`, and what it names.
 pub type Transport = (&'static str, TransportKind);
 
-/// Every transport with itself: none speaks with another.
+/// Every transport with itself: none reaches another.
 fn pairs() -> impl Iterator<Item = (Transport, Transport)> {
     TransportKind::BUILT_IN.iter().map(|one| (*one, *one))
 }
@@ -56,7 +56,7 @@ fn runtime(domain: &TestDomain, transport: Transport, name: &str) -> Runtime {
     Runtime::with_transport(name, args, &network).unwrap()
 }
 
-/// A process that says again on `/said` what it hears on `/heard`, has a latched `/map` and a service `~/reset`.
+/// A process that publishes on `/said` what it receives on `/heard`, has a latched `/map` and a service `~/reset`.
 pub struct Echo(pub Child);
 
 impl Echo {

@@ -1,4 +1,4 @@
-//! Peers that are killed, or stopped and continued, are heard again.
+//! Peers that are killed, or stopped and continued, are received again.
 
 use std::time::Duration;
 

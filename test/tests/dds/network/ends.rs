@@ -1,4 +1,4 @@
-//! The two ends: they say on standard output what they have sent and heard once their input is closed.
+//! The two ends: they print what they have sent and received, once their input is closed.
 
 use std::collections::BTreeMap;
 use std::io::{Read, stdin};

@@ -1,4 +1,4 @@
-//! DDS Security: who has a key and a permission is heard, nobody else is, and nothing can be read.
+//! DDS Security: messages arrive from peers with key and permission, from nobody else, and cannot be read.
 
 mod foreign;
 mod keystore;
@@ -23,7 +23,7 @@ use lattice_test::python::{python, script};
 use self::keystore::{Keystore, NOW, OF_A_NODE, PAST, openssl_is_there};
 use self::peers::{Peer, QOS, talk, topic, until};
 
-/// Words that are heard from a friend while strangers are heard not once: 5 s.
+/// Words received from a permitted peer while none of others is: 5 s.
 const WORDS: usize = 50;
 
 /// False, with a line on standard error, where there is nothing to test.

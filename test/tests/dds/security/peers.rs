@@ -1,4 +1,4 @@
-//! Peers that say a word again and again on one topic and write down what they hear.
+//! Peers that publish a word again and again on one topic and write down what they receive.
 //!
 //! They are processes: this test program once more, as the test `peer`.
 

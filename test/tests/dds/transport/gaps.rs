@@ -12,7 +12,7 @@ use super::*;
 /// Messages before the late subscriber, and after it.
 const MESSAGES: usize = 300;
 
-/// The numbers from the first that was heard to the last one, each once, and none counted as lost.
+/// The numbers from the first received to the last one, each once, and none counted as lost.
 fn assert_all_from_first(
     (subscription, heard): &(Subscription, Receiver<Arc<RosString>>),
     last: usize,

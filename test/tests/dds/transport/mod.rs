@@ -47,7 +47,7 @@ impl Two {
         self.from.publisher(topic, qos).unwrap()
     }
 
-    /// Messages that the second process hears.
+    /// Messages that the second process receives.
     fn hear<M: RosMessage>(
         &self,
         topic: &str,

@@ -1,4 +1,4 @@
-//! The state machine with a search that answers what it is told.
+//! The state machine with a search whose answers a test sets.
 
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
@@ -20,7 +20,7 @@ use lattice_test::clouds::{SECOND_NS, labelled_cloud};
 use lattice_test::maps;
 use nalgebra::Isometry3;
 
-/// Answers as it is told.
+/// Answers that a test sets.
 #[derive(Default)]
 pub struct Fake {
     pub maps: usize,

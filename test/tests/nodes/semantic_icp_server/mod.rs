@@ -1,4 +1,4 @@
-//! The server's logic with a search that answers as it is told, and once with the true one.
+//! The server's logic with a search whose answers a test sets, and once with the true one.
 
 mod bench;
 mod looks;

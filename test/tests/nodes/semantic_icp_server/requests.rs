@@ -1,4 +1,4 @@
-//! Callers: answered, refused, superseded, cancelled, and told at the end.
+//! Callers: answered, refused, superseded, cancelled, and notified at the end.
 
 use std::sync::atomic::Ordering::Relaxed;
 

@@ -1,4 +1,4 @@
-//! Results of calibrations, as a node of the demo hears them.
+//! Results of calibrations, as a node of the demo receives them.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -20,7 +20,7 @@ const NEXT_ANSWERS: f64 = 3.0;
 /// Longest sleep between two looks at the shutdown flag.
 const NAP: Duration = Duration::from_millis(100);
 
-/// Node of this process that hears of calibrations.
+/// Node of this process that receives calibrations.
 pub struct Results {
     heard: Receiver<Arc<CalibrationResult>>,
     shutdown: Shutdown,

@@ -1,4 +1,4 @@
-//! A headless Chromium that is told what to do over its DevTools protocol.
+//! A headless Chromium, controlled over its DevTools protocol.
 
 use std::io::{BufRead, BufReader};
 use std::net::TcpStream;

@@ -113,7 +113,7 @@ impl Stage {
         });
     }
 
-    /// Tells where the robot is.
+    /// Publishes the position of the robot.
     pub fn robot_at(&self, [x, y, z]: [f64; 3]) {
         let mut transform = TransformStamped {
             child_frame_id: "base_link".to_owned(),
@@ -151,13 +151,13 @@ impl Stage {
             .offer(channel, cdr::to_vec(&states).unwrap());
     }
 
-    /// Tells of free cells.
+    /// Publishes free cells.
     pub fn frees(&self, cells: &[Known]) {
         self.broadcaster
             .offer(self.free, cdr::to_vec(&map(cells)).unwrap());
     }
 
-    /// Tells the names of labels.
+    /// Publishes the names of labels.
     pub fn names(&self, classes: &[(u16, &str)]) {
         let class = |&(class_id, name): &(u16, &str)| VisionClass {
             class_id,
@@ -171,7 +171,7 @@ impl Stage {
             .offer(self.label_info, cdr::to_vec(&info).unwrap());
     }
 
-    /// Tells of a calibration.
+    /// Publishes a calibration.
     pub fn calibrated(&self, result: &CalibrationResult) {
         self.broadcaster
             .offer(self.calibration, cdr::to_vec(result).unwrap());

@@ -21,7 +21,7 @@ pub struct Case {
     pub outcome: Outcome,
     /// Texts on standard error beside a map.
     pub says: &'static [&'static str],
-    /// True if it is played over DDS too.
+    /// True if it is also played over DDS.
     pub over_dds: bool,
 }
 

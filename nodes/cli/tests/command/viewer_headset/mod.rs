@@ -1,5 +1,5 @@
-//! A headset that speaks the Foxglove protocol over the viewer's socket: what it sends is calibrated, and the
-//! answer comes back.
+//! A headset with the Foxglove protocol over the viewer's socket: its clouds are calibrated, and it receives the
+//! answer.
 
 mod client;
 mod scene;
@@ -21,7 +21,7 @@ use crate::PATIENCE;
 use crate::viewer::Viewer;
 use crate::viewer_foreign::folder;
 
-/// Parameters of all nodes in one process: the mapper goes on from the map.
+/// Parameters of all nodes in one process: the mapper continues the map.
 fn params(folder: &Path) -> String {
     let dir = folder.display();
     let text = format!(
@@ -108,7 +108,7 @@ fn ask_for_a_calibration(client: &mut Client) {
     }
 }
 
-/// Messages that cannot be taken: each is told and counted, and the next client is served.
+/// Messages that cannot be taken: each is reported and counted, and the next client is served.
 fn hostile(mut client: Client, url: &str) {
     let mesh = client
         .mine

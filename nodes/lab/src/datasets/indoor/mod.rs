@@ -105,7 +105,7 @@ impl fmt::Display for IndoorSummary {
     }
 }
 
-/// Writes the log. `progress` hears the share done.
+/// Writes the log. `progress` is called with the share done, 0..1.
 pub fn write_indoor(
     options: &IndoorOptions,
     progress: &mut dyn FnMut(f64),

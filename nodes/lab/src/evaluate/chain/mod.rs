@@ -82,7 +82,7 @@ impl ChainOptions {
     }
 }
 
-/// A house with a look, and its map: with labels of the network, with true ones, and without.
+/// A house with a headset scan, and its map: with labels of the network, with true ones, and without.
 struct Place {
     house: House,
     look: u64,
@@ -121,7 +121,7 @@ pub fn chain_settings(options: &ChainOptions) -> Result<Settings, AnyError> {
 
 /// Runs the trials that the results do not have yet, seed by seed.
 ///
-/// `progress` hears of views of scenes done, of all that are left.
+/// `progress` is called with the number of views done, and of all that are left.
 pub fn run_chain(
     options: &ChainOptions,
     results: &mut Results,

@@ -32,7 +32,7 @@ fn read(params: &Params) -> Result<Options, ParamError> {
     ))
 }
 
-/// Parameters of a node, the options it was given since, and what was told.
+/// Parameters of a node, the options it was given since, and its notifications.
 fn node() -> (Params, Receiver<Options>, Receiver<(Values, Values)>) {
     let given = [("most_m", ParamValue::I64(40))];
     let params = Params::from_values("/n", given);

@@ -1,4 +1,4 @@
-//! Faults of a document: where, the value there, and the problem that is told.
+//! Faults of a document: where, the value there, and the problem reported.
 
 use serde_json::{Value, json};
 

@@ -79,7 +79,7 @@ fn finding(trials: &Trials) -> String {
     )
 }
 
-/// The share of wrong labels that the paper tells of.
+/// The share of wrong labels that the paper gives.
 fn labels_of(trials: &Trials, scene: Scene) -> f64 {
     if blamed(scene) { trials.bad } else { 0.0 }
 }

@@ -77,7 +77,7 @@ struct Seen {
 }
 
 impl<'a> RoomImages<'a> {
-    /// A look of a house, by a seed alone; another seed is another set of materials and lamps.
+    /// Materials and lamps of a house, by a seed alone.
     pub fn new(house: &'a House, seed: u64) -> RoomImages<'a> {
         let mut stream = Stream::new(seed, Purpose::Lamps, 0, 0);
         let lamps = Lamps::new(house, &mut stream);

@@ -33,7 +33,7 @@ pub fn look_views(house: &House, views: usize, seed: u64) -> Result<Vec<Isometry
     Ok((0..views).map(view).collect())
 }
 
-/// A look from a free place at a thing, and how far that is.
+/// A view from a free place towards an object, and their distance.
 fn look(house: &House, stream: &mut Stream) -> (Isometry3<f64>, f64) {
     let mut between = |low: f64, high: f64| low + (high - low) * stream.uniform();
     let cells = &house.free.cells_m;
