@@ -18,6 +18,7 @@ const MAX_TOLD: usize = 100;
 
 /// Result of a recovery.
 #[derive(Clone, Debug, Default, Serialize)]
+#[non_exhaustive]
 pub struct Recovered {
     /// Messages in the new bag.
     pub messages: u64,
@@ -37,6 +38,7 @@ pub struct Recovered {
 
 /// Unchecked messages of one topic.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Unchecked {
     /// Name of the topic.
     pub topic: String,
