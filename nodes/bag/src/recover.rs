@@ -38,7 +38,6 @@ pub struct Recovered {
 
 /// Unchecked messages of one topic.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Unchecked {
     /// Name of the topic.
     pub topic: String,
