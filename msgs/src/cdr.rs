@@ -12,6 +12,7 @@ const MAX_PADDING: usize = 3;
 
 /// Error of decoding or encoding a message.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum CdrError {
     /// Missing header.
     #[error("CDR message of {length} bytes; its header alone has 4")]

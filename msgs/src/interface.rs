@@ -43,6 +43,28 @@ impl Schema {
 }
 
 /// A message, or one part of a service or an action.
+///
+/// ```
+/// use lattice_msgs::{RosMessage, Schema, type_hash};
+/// use serde::{Deserialize, Serialize};
+///
+/// /// A message of one's own, with its fields in the order of the text.
+/// #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// struct Battery {
+///     volts: f32,
+///     cells: Vec<f32>,
+/// }
+///
+/// impl RosMessage for Battery {
+///     const SCHEMA: &'static Schema = &Schema {
+///         type_name: "my_msgs/msg/Battery",
+///         text: "float32 volts\nfloat32[] cells\n",
+///         dependencies: &[],
+///     };
+/// }
+///
+/// assert!(type_hash(Battery::TYPE, &Battery::definition()).is_some());
+/// ```
 pub trait RosMessage:
     Clone + Debug + Default + PartialEq + Serialize + DeserializeOwned + Send + Sync + 'static
 {
@@ -71,6 +93,11 @@ pub trait RosService {
 /// Name of a ROS type on DDS: `sensor_msgs/msg/PointCloud2` is `sensor_msgs::msg::dds_::PointCloud2_`.
 ///
 /// `None` unless the name has the three parts of a full type name.
+///
+/// ```
+/// let name = lattice_msgs::dds_type_name("std_msgs/msg/String");
+/// assert_eq!(name.as_deref(), Some("std_msgs::msg::dds_::String_"));
+/// ```
 pub fn dds_type_name(type_name: &str) -> Option<String> {
     let mut parts = type_name.split('/');
     let (package, kind, name) = (parts.next()?, parts.next()?, parts.next()?);

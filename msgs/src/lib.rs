@@ -1,10 +1,31 @@
 //! ROS 2 messages as serde structs.
 //!
 //! One module per ROS package, with the names of ROS; a field named `type` is `type_` here.
-//! The layout is that of Jazzy. [`RosMessage`] provides each message's type name and schema text,
-//! [`cdr`] encodes and decodes messages. [`hash_of`] is the type hash
-//! (RIHS01) of a message of this crate, [`type_hash`] that of any definition.
+//! The layout is that of Jazzy.
+//!
+//! | to | begin with |
+//! |---|---|
+//! | build or read a message | its package, such as [`sensor_msgs`] or [`geometry_msgs`] |
+//! | encode and decode it | [`cdr::to_vec`], [`cdr::from_slice`] |
+//! | know its type name and schema text | [`RosMessage`], [`definition_of`] |
+//! | know its type hash (RIHS01) | [`hash_of`]; [`type_hash`] of any definition |
+//! | define a message of your own | [`RosMessage`], [`RosService`], [`RosAction`] |
+//!
+//! ```
+//! use lattice_msgs::builtin_interfaces::Time;
+//! use lattice_msgs::cdr;
+//!
+//! let bytes = cdr::to_vec(&Time { sec: 1, nanosec: 2 })?;
+//! assert_eq!(bytes, [0, 1, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
+//! assert_eq!(cdr::from_slice::<Time>(&bytes)?.to_ns(), 1_000_000_002);
+//! # Ok::<(), cdr::CdrError>(())
+//! ```
 #![forbid(unsafe_code)]
+
+/// Runs the example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 pub mod action;
 pub mod action_msgs;

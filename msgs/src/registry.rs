@@ -51,6 +51,12 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
 }
 
 /// Definition of a message of this crate with its dependencies (`ros2msg` text).
+///
+/// ```
+/// let definition = lattice_msgs::definition_of("std_msgs/msg/String");
+/// assert!(definition.is_some_and(|text| text.contains("string data")));
+/// assert_eq!(lattice_msgs::definition_of("my_msgs/msg/Unknown"), None);
+/// ```
 pub fn definition_of(ros_type: &str) -> Option<String> {
     struct Find<'a>(&'a str, Option<String>);
     impl MessageVisitor for Find<'_> {

@@ -5,6 +5,7 @@ use thiserror::Error;
 /// Reason that the layout or the times of a cloud cannot be read.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum CloudError {
     /// More points than the limit.
     #[error(

@@ -23,6 +23,30 @@ pub struct PointField {
 }
 
 /// Memory layout of a cloud, as `sensor_msgs/PointCloud2`.
+///
+/// ```
+/// use lattice_core::cloud::{CloudLayout, CloudLimits, Datatype, PointField};
+///
+/// let field = |(name, offset): (&str, u32)| PointField {
+///     name: name.into(),
+///     offset,
+///     datatype: Datatype::Float32 as u8,
+///     count: 1,
+/// };
+/// let layout = CloudLayout {
+///     width: 1,
+///     height: 1,
+///     point_step: 12,
+///     row_step: 12,
+///     is_bigendian: false,
+///     fields: [("x", 0), ("y", 4), ("z", 8)].map(field).into(),
+/// };
+/// let data = [1.0_f32, 2.0, 3.0].map(f32::to_le_bytes).concat();
+/// let view = layout.view(&data, &CloudLimits::default())?;
+/// assert_eq!(view.xyz(0).as_slice(), [1.0, 2.0, 3.0]);
+/// assert!(layout.view(&data[..11], &CloudLimits::default()).is_err());
+/// # Ok::<(), lattice_core::cloud::CloudError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CloudLayout {
     /// Points per row.

@@ -5,6 +5,16 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 use super::{GeodesyError, Geodetic, ecef_from_geodetic, geodetic_from_ecef};
 
 /// ENU frame tangent to the ellipsoid at its origin, metres.
+///
+/// ```
+/// use lattice_core::geodesy::{EnuFrame, Geodetic};
+///
+/// let frame = EnuFrame::new(Geodetic::from_degrees(48.0, 11.0, 500.0)?);
+/// let north = Geodetic::from_degrees(48.001, 11.0, 500.0)?;
+/// let enu_m = frame.enu_from_geodetic(&north);
+/// assert!((enu_m.y - 111.2).abs() < 0.1);
+/// # Ok::<(), lattice_core::geodesy::GeodesyError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnuFrame {
     origin: Geodetic,

@@ -5,6 +5,7 @@ use thiserror::Error;
 /// Reason that a position is not on or near the Earth.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum GeodesyError {
     /// NaN or infinite coordinate.
     #[error("{name} is {value}; drop the position until the receiver has a fix")]

@@ -50,6 +50,7 @@ const INDEX_LIMIT: u64 = 1 << 20;
 
 /// Error in the definition of a lattice.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum LatticeError {
     /// Unknown lattice name.
     #[error("unknown lattice {0:?}: use one of cubic, bcc, fcc, mcc, hex, hexopt")]
@@ -86,6 +87,18 @@ pub enum LatticeError {
 }
 
 /// Lattice of one kind, cell volume and orientation; cheap to clone.
+///
+/// ```
+/// use lattice_core::lattice::{Lattice, LatticeKind};
+/// use lattice_core::nalgebra::Vector3;
+///
+/// let lattice = Lattice::new(LatticeKind::Fcc, 0.125)?;
+/// let point_m = Vector3::new(1.2, -0.4, 3.1);
+/// let cell = lattice.quantize(&point_m).expect("the point is finite and near");
+/// let apart_m = (point_m - lattice.center(cell)).norm();
+/// assert!(apart_m <= lattice.covering_radius_m());
+/// # Ok::<(), lattice_core::lattice::LatticeError>(())
+/// ```
 #[derive(Clone)]
 pub struct Lattice {
     quantizer: Quantizer,
@@ -149,6 +162,7 @@ impl Lattice {
     ///
     /// Replaces an earlier orientation; the identity changes no bit. With a rotation that is not finite, no point has
     /// a cell.
+    #[must_use]
     pub fn oriented(self, map_from_lattice: UnitQuaternion<f64>) -> Lattice {
         let rotation = orientation::canonical(map_from_lattice);
         if rotation == self.shape.map_from_lattice {

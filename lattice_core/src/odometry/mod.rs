@@ -78,6 +78,7 @@ impl Scan<'_> {
 
 /// The pose of a scan.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ScanResult {
     /// Time of the first point, nanoseconds.
     pub first_ns: i64,

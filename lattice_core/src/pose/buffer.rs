@@ -79,6 +79,20 @@ pub(super) fn seconds(ns: &i64) -> f64 {
 }
 
 /// Recent poses of a machine, by time.
+///
+/// ```
+/// use lattice_core::nalgebra::Isometry3;
+/// use lattice_core::pose::{PoseBuffer, PoseBufferOptions, PoseMiss, StampedPose};
+///
+/// let mut buffer = PoseBuffer::new(PoseBufferOptions::default());
+/// for (stamp_ns, x) in [(0, 0.0), (100_000_000, 1.0)] {
+///     let map_from_base = Isometry3::translation(x, 0.0, 0.0);
+///     buffer.push(StampedPose { stamp_ns, map_from_base });
+/// }
+/// assert_eq!(buffer.at(50_000_000)?.translation.x, 0.5);
+/// assert!(matches!(buffer.at(100_000_001), Err(PoseMiss::AfterEnd { by_ns: 1 })));
+/// # Ok::<(), PoseMiss>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct PoseBuffer {
     track: Track,

@@ -7,6 +7,7 @@ use super::buffer::seconds;
 /// Reason that a transform is refused.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum TfInsertError {
     /// Frame without a name.
     #[error("transform from '{child}' to '{parent}' has a frame without a name")]

@@ -7,6 +7,7 @@ use super::MAX_COORDINATE_M;
 
 /// Error of a query.
 #[derive(Clone, PartialEq, Debug, Error)]
+#[non_exhaustive]
 pub enum QueryError {
     /// Coordinate or extent that is not finite or exceeds [`MAX_COORDINATE_M`].
     #[error("point or extent {0:?} m is not finite or beyond {MAX_COORDINATE_M} m")]

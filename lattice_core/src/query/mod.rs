@@ -46,6 +46,25 @@ pub const MAX_COORDINATE_M: f64 = 1e12;
 /// Points near the surface are resolved by probing cells in order of distance. The first query that this cannot
 /// resolve sorts the keys (8 bytes each, kept). Later ones search the octree of the sorted Morton keys in logarithmic
 /// time.
+///
+/// ```
+/// use lattice_core::cloud::Cloud;
+/// use lattice_core::lattice::{Lattice, LatticeKind};
+/// use lattice_core::nalgebra::Vector3;
+/// use lattice_core::query::{Query, Segment};
+/// use lattice_core::voxels::VoxelList;
+///
+/// let lattice = Lattice::new(LatticeKind::Cubic, 1.0)?;
+/// let mut map = VoxelList::new(lattice, Vector3::zeros(), 1000)?;
+/// map.insert(&Cloud::from_points(0, Vector3::zeros(), &[Vector3::zeros()]));
+///
+/// let query = Query::new(&map);
+/// let point_m = Vector3::new(2.0, 0.0, 0.0);
+/// assert_eq!(query.nearest(&point_m, 1)?[0].distance_m, 2.0); // to the centre
+/// let clearance = query.clearance(&Segment::point(point_m), 10.0)?;
+/// assert_eq!(clearance.map(|found| found.distance_m), Some(1.5)); // to the cube
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Query<'a, S> {
     store: &'a S,
     shells: Arc<Shells>,
@@ -77,6 +96,7 @@ impl<'a, S: VoxelStore> Query<'a, S> {
     }
 
     /// Uses a tree from [`Query::prepare_nearest`] of this state of the store.
+    #[must_use]
     pub fn with_prepared(self, prepared: PreparedNearest) -> Query<'a, S> {
         Query {
             prepared: OnceLock::from(Some(prepared)),

@@ -87,6 +87,7 @@ pub struct Path {
 /// Failure of a path search.
 #[derive(Clone, PartialEq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum PathError {
     /// Invalid query.
     #[error(transparent)]

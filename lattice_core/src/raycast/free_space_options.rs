@@ -40,6 +40,7 @@ impl Default for FreeSpaceOptions {
 
 /// Option out of range.
 #[derive(Clone, PartialEq, Debug, Error)]
+#[non_exhaustive]
 pub enum FreeSpaceError {
     /// Inconsistent probabilities.
     #[error(transparent)]

@@ -30,6 +30,20 @@ const SEED_CELLS: usize = 1 << 14;
 ///
 /// A coarse cell gets one miss per scan if a ray traverses a fine cell that belongs to it and no hit fine cell
 /// overlaps it. It is free if its log-odds are below the threshold and no occupied fine cell overlaps it.
+///
+/// ```
+/// use lattice_core::cloud::Cloud;
+/// use lattice_core::lattice::{Lattice, LatticeKind};
+/// use lattice_core::nalgebra::Vector3;
+/// use lattice_core::raycast::{FreeSpaceMap, FreeSpaceOptions, RayBundle};
+///
+/// let lattice = Lattice::new(LatticeKind::Cubic, 1.0)?;
+/// let mut map = FreeSpaceMap::new(lattice, Vector3::zeros(), FreeSpaceOptions::default())?;
+/// let ends = Cloud::from_points(0, Vector3::zeros(), &[Vector3::new(5.0, 0.0, 0.0)]);
+/// map.insert_scan(&[RayBundle { origin_m: Vector3::zeros(), ends: &ends }]);
+/// assert_eq!((map.occupied_keys().len(), map.free_keys().len()), (1, 5));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone)]
 pub struct FreeSpaceMap {
     traversal: Traversal,

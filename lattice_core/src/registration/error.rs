@@ -5,6 +5,7 @@ use thiserror::Error;
 /// Reason that a cloud cannot be prepared for registration.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum RegistrationError {
     /// Fewer points than a neighbourhood needs.
     #[error("point count {points} is below {least}")]

@@ -10,6 +10,7 @@ use crate::lattice::MortonKey;
 /// Error in encoded keys; positions are bytes from the start of the keys.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum CodecError {
     /// Bytes that end within a varint.
     #[error("the bytes end at byte {position} within a number: the message or file is cut short")]

@@ -4,7 +4,9 @@
 //! merge exactly.
 
 pub mod codec;
+#[cfg(feature = "file")]
 pub mod file;
+#[cfg(feature = "file")]
 pub mod label_names;
 pub mod set_ops;
 

@@ -7,6 +7,7 @@ use thiserror::Error;
 /// Error of reading, writing or playing a bag.
 #[derive(Clone, Debug, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum BagError {
     /// Error of the operating system.
     #[error("{}: cannot {doing}: {source}; check that the path exists, its permissions and the free space", path.display())]

@@ -1,5 +1,19 @@
 //! Reading, writing and playing of rosbag2 bags.
+//!
+//! | to | begin with |
+//! |---|---|
+//! | read topics and messages | [`BagReader::open`], [`BagReader::messages`] |
+//! | write a bag | [`BagWriter::create`] |
+//! | play a bag at its times | [`Player`], a state machine without a clock |
+//! | copy what a damaged bag still has | [`recover`] |
+//!
+//! Messages are CDR bytes with their encapsulation header. `examples/1_write_and_read_a_bag.rs` does both.
 #![forbid(unsafe_code)]
+
+/// Compiles the example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod error;
 mod mcap_storage;

@@ -31,6 +31,17 @@ pub struct ReadOptions {
 }
 
 /// A bag opened for reading. Cheap to clone.
+///
+/// ```no_run
+/// use lattice_bag::{BagReader, ReadOptions};
+///
+/// let bag = BagReader::open("my_bag".as_ref())?;
+/// for message in bag.messages(&ReadOptions::default())? {
+///     let message = message?;
+///     println!("{}: {} bytes", bag.topics()[message.topic].name, message.data.len());
+/// }
+/// # Ok::<(), lattice_bag::BagError>(())
+/// ```
 #[derive(Clone)]
 pub struct BagReader {
     path: PathBuf,
@@ -117,6 +128,7 @@ impl BagReader {
     }
 
     /// The same bag, whose truncated files end without an error; see [`BagReader::cuts`].
+    #[must_use]
     pub fn past_cut(self) -> BagReader {
         BagReader {
             past_cut: true,

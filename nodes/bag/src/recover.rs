@@ -18,6 +18,7 @@ const MAX_TOLD: usize = 100;
 
 /// Result of a recovery.
 #[derive(Clone, Debug, Default, Serialize)]
+#[non_exhaustive]
 pub struct Recovered {
     /// Messages in the new bag.
     pub messages: u64,

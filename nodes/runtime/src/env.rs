@@ -89,6 +89,7 @@ pub struct ZenohSettings {
 
 /// Invalid environment variable.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum EnvError {
     /// Invalid `ROS_DOMAIN_ID`.
     #[error("ROS_DOMAIN_ID={0:?} is outside 0..=232; set a DDS domain in this range or unset it")]

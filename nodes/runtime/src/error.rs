@@ -9,6 +9,7 @@ use super::security::SecurityError;
 
 /// Reason why a runtime, a node or an endpoint cannot be made.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum RuntimeError {
     /// The DDS participant could not be created.
     #[error(
@@ -87,6 +88,7 @@ pub enum RuntimeError {
 
 /// Reason why a message was not queued.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum PublishError {
     /// The queue is full.
     #[error("{topic}: the queue of the publisher is full, message dropped ({dropped} so far)")]

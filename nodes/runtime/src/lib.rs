@@ -1,6 +1,27 @@
 //! ROS 2 client library: arguments, names, parameters, topics, services, actions, time and logging, over
 //! an abstract transport.
+//!
+//! | to | begin with |
+//! |---|---|
+//! | start a process and its nodes | [`ros_args::RosArgs::parse`], [`Runtime::start`], [`Runtime::node`] |
+//! | publish | [`Node::publisher`] |
+//! | subscribe | [`Node::subscribe`] |
+//! | serve and call a service | [`Node::service`], [`Node::client`] |
+//! | serve an action | [`Node::action_server`] |
+//! | read parameters | [`Node::params`] |
+//! | run code in periods | [`Runtime::timer`] |
+//! | manage states | [`lifecycle`] |
+//! | report to `/diagnostics` | [`Node::diagnostics`] |
+//! | be apart from all else on the machine, as in tests | [`LoopbackDomain`] |
+//!
+//! Programs are in `examples/`: `1_publish_and_subscribe`, `2_service`, `3_action`. Messages are those of
+//! [`lattice_msgs`].
 #![deny(unsafe_code)]
+
+/// Compiles the example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod action;
 mod arrivals;

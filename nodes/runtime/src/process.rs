@@ -27,6 +27,21 @@ const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
 /// Runs the nodes of a process. Dropping it closes the participant, which peers notice at once.
 ///
 /// While it exists, SIGINT and SIGTERM request shutdown. Must not be dropped on one of its own threads.
+///
+/// ```no_run
+/// use std::time::Duration;
+///
+/// use lattice_msgs::std_msgs::Bool;
+/// use lattice_runtime::{Runtime, qos::Qos, ros_args::RosArgs};
+///
+/// let runtime = Runtime::start("pulse", RosArgs::parse(std::env::args())?)?;
+/// let publisher = runtime.node("pulse")?.publisher("pulse", Qos::DEFAULT)?;
+/// let _timer = runtime.timer(Duration::from_secs(1), move || {
+///     let _ = publisher.publish(Bool { data: true });
+/// });
+/// runtime.spin()?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Runtime {
     shared: Arc<Shared>,
     args: Arc<RosArgs>,

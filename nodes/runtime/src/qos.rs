@@ -24,6 +24,14 @@ pub enum Durability {
 }
 
 /// QoS of a topic; the history is always "keep last `depth`".
+///
+/// ```
+/// use lattice_runtime::qos::{Durability, Qos, Reliability};
+///
+/// let latched = Qos::latched(1);
+/// assert_eq!(latched.durability, Durability::TransientLocal);
+/// assert_eq!(Qos::SENSOR.reliability, Reliability::BestEffort);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Qos {
     /// Reliability.
@@ -108,6 +116,7 @@ impl Qos {
     }
 
     /// The same QoS with fewer samples for late joiners.
+    #[must_use]
     pub const fn keeping(self, samples: usize) -> Qos {
         Qos {
             kept: Some(samples),

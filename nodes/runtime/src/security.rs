@@ -59,6 +59,7 @@ pub(crate) struct Secrets {
 
 /// Reason why a participant cannot be secured.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum SecurityError {
     /// No keystore is set.
     #[error("{ENABLE} is true, but {KEYSTORE} names no keystore")]

@@ -20,6 +20,17 @@ const SHORT: [(&str, usize); 2] = [
     ("docs/dev/benchmarks.md", 1500),
 ];
 
+/// Pages outside of the folders of pages.
+const FRONT: [&str; 7] = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "RELEASING.md",
+    "lattice_core/README.md",
+    "msgs/README.md",
+    "nodes/bag/README.md",
+    "nodes/runtime/README.md",
+];
+
 /// Metaphors in doc comments: a number to lower, never to raise.
 const METAPHORS_IN_COMMENTS: usize = 6;
 
@@ -175,7 +186,7 @@ fn pages_in(folder: &str) -> Vec<PathBuf> {
 }
 
 fn pages_to_read() -> Vec<PathBuf> {
-    let front = ["README.md", "CONTRIBUTING.md"].map(|page| root().join(page));
+    let front = FRONT.map(|page| root().join(page));
     let folders = ["docs", "docs/dev"].into_iter().flat_map(pages_in);
     front.into_iter().chain(folders).collect()
 }

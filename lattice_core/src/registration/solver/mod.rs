@@ -60,6 +60,30 @@ pub struct Registration {
 ///
 /// The clouds may be far from their origins. The result is bit-identical on any number of threads. Without
 /// correspondences, or from a guess that is not finite, the guess is returned, not converged.
+///
+/// ```
+/// use lattice_core::nalgebra::{Isometry3, Point3};
+/// use lattice_core::registration::{
+///     PrepareOptions, PreparedCloud, RegisterOptions, RegistrationError, SemanticCloud, register,
+/// };
+///
+/// // Three planes at right angles, and the same 5 cm off.
+/// let grid = |i: u32| (f64::from(i % 20) * 0.1, f64::from(i / 20) * 0.1);
+/// let planes = (0..400).map(grid).flat_map(|(u, v)| {
+///     [Point3::new(u, v, 0.0), Point3::new(u, 0.0, v), Point3::new(0.0, u, v)]
+/// });
+/// let target = SemanticCloud::unlabelled(planes.collect());
+/// let target_from_source = Isometry3::translation(0.05, 0.05, 0.05);
+/// let moved = target.points_m.iter().map(|p| target_from_source.inverse() * p);
+/// let source = SemanticCloud::unlabelled(moved.collect());
+///
+/// let options = PrepareOptions::default();
+/// let (source, target) = (PreparedCloud::new(source, &options)?, PreparedCloud::new(target, &options)?);
+/// let found = register(&source, &target, &Isometry3::identity(), &RegisterOptions::gicp(0.5));
+/// let error = target_from_source.inverse() * found.target_from_source;
+/// assert!(found.converged && error.translation.vector.norm() < 1e-3);
+/// # Ok::<(), RegistrationError>(())
+/// ```
 pub fn register(
     source: &PreparedCloud,
     target: &PreparedCloud,

@@ -41,6 +41,22 @@ pub struct DatumError {
 ///
 /// The datum is a lattice point of the map frame. Lists with one lattice and datum have the same cells, and points
 /// far from the map origin keep their precision.
+///
+/// ```
+/// use lattice_core::cloud::Cloud;
+/// use lattice_core::lattice::{Lattice, LatticeKind};
+/// use lattice_core::nalgebra::Vector3;
+/// use lattice_core::voxels::VoxelList;
+///
+/// let lattice = Lattice::new(LatticeKind::Cubic, 1.0)?;
+/// let mut list = VoxelList::new(lattice, Vector3::zeros(), 1000)?;
+/// let points_m = [0.1, 0.2, 2.0].map(|x| Vector3::new(x, 0.0, 0.0));
+/// let report = list.insert(&Cloud::from_points(0, Vector3::zeros(), &points_m));
+/// assert_eq!((report.inserted, report.new_voxels), (3, 2));
+/// let counts: Vec<_> = list.sorted().iter().map(|(_, voxel)| voxel.count).collect();
+/// assert_eq!(counts, [2, 1]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone)]
 pub struct VoxelList {
     pub(super) lattice: Lattice,
@@ -91,6 +107,7 @@ impl VoxelList {
     }
 
     /// Sets the optional columns; the list becomes empty.
+    #[must_use]
     pub fn with_payload(self, payload: Payload) -> VoxelList {
         let mut list = VoxelList::at_datum(self.lattice, self.datum_index, self.max_voxels);
         list.payload = payload;

@@ -20,6 +20,7 @@ pub enum WhenFull {
 
 impl VoxelList {
     /// Sets the policy of [`VoxelList::insert`].
+    #[must_use]
     pub fn with_when_full(mut self, when_full: WhenFull) -> VoxelList {
         self.when_full = when_full;
         self

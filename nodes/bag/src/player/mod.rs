@@ -39,6 +39,22 @@ pub enum Step {
 }
 
 /// A bag being played.
+///
+/// ```no_run
+/// use lattice_bag::{BagReader, Player, PlayerOptions, Step};
+///
+/// let bag = BagReader::open("my_bag".as_ref())?;
+/// let mut player = Player::new(bag, PlayerOptions::default())?;
+/// loop {
+///     println!("wait until {} ns", player.due_ns());
+///     match player.next()? {
+///         Step::Publish { topic, data } => println!("{topic}: {} bytes", data.len()),
+///         Step::End => break,
+///         Step::Clock(_) | Step::Looped => {}
+///     }
+/// }
+/// # Ok::<(), lattice_bag::BagError>(())
+/// ```
 pub struct Player {
     reader: BagReader,
     topics: Vec<PlayedTopic>,

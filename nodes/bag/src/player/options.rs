@@ -42,6 +42,7 @@ impl Default for PlayerOptions {
 
 /// A played topic.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct PlayedTopic {
     /// Index into the reader's topics.
     pub bag_topic: usize,

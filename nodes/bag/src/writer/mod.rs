@@ -89,6 +89,23 @@ fn failed(path: &Path, doing: &'static str) -> impl FnOnce(SinkError) -> BagErro
 }
 
 /// A bag being written. Without [`BagWriter::finish`] it lacks `metadata.yaml`.
+///
+/// ```
+/// use lattice_bag::{BagReader, BagWriter, Storage, TopicSpec, WriterOptions};
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("bag");
+/// let mut writer = BagWriter::create(&path, Storage::Mcap, WriterOptions::default())?;
+/// let topic = writer.add_topic(TopicSpec {
+///     name: "/on".into(),
+///     type_name: "std_msgs/msg/Bool".into(),
+///     ..TopicSpec::default()
+/// })?;
+/// writer.write(topic, 1_000, &[0, 1, 0, 0, 1])?;
+/// writer.finish()?;
+/// assert_eq!(BagReader::open(&path)?.message_count(), 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct BagWriter {
     folder: PathBuf,
     storage: Storage,

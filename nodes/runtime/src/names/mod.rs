@@ -15,6 +15,7 @@ const NODE_NAME_LENGTH_MAX: usize = 255;
 
 /// Reason for rejecting a name. Names are shortened for the message.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum NameError {
     #[error("the {what} {name:?} {problem}")]
     Invalid {

@@ -11,6 +11,18 @@ use crate::shared::Client;
 
 impl Node {
     /// Serves `S`; the handler runs on the io thread and must return at once.
+    ///
+    /// ```no_run
+    /// use lattice_msgs::std_srvs::{SetBool, SetBoolResponse};
+    /// # fn serve(node: &lattice_runtime::Node) -> Result<(), lattice_runtime::RuntimeError> {
+    /// let server = node.service::<SetBool>("~/set_on", |request| SetBoolResponse {
+    ///     success: true,
+    ///     message: format!("set to {}", request.data),
+    /// })?;
+    /// println!("serving {}", server.name());
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn service<S: RosService + 'static>(
         &self,
         name: &str,

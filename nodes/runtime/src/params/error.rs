@@ -3,6 +3,7 @@ use thiserror::Error;
 
 /// Reason for rejecting parameters.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ParamError {
     /// A parameter file is rejected.
     #[error(transparent)]

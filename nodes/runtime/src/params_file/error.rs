@@ -6,6 +6,7 @@ use crate::param_value::{ScanError, ValueError};
 
 /// Reason for rejecting a parameter file.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ParamFileError {
     /// The file cannot be read.
     #[error("parameter file {path:?}: {source}")]

@@ -2,6 +2,7 @@ use thiserror::Error;
 
 /// Reason for rejecting a command line; the message gives the argument, the expected form and an example.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum RosArgsError {
     /// The last argument is a flag that needs a value.
     #[error(

@@ -14,6 +14,17 @@ use std::path::PathBuf;
 use crate::names::{RemapRule, RemapTarget};
 
 /// A parsed command line.
+///
+/// ```
+/// use lattice_runtime::ros_args::RosArgs;
+///
+/// let words = "mapper --fast --ros-args -r __node:=left -r __ns:=/robot".split(' ');
+/// let args = RosArgs::parse(words.map(str::to_owned))?;
+/// assert_eq!(args.user_args, ["mapper", "--fast"]);
+/// assert_eq!(args.node_name("mapper"), "left");
+/// assert_eq!(args.namespace("mapper"), "/robot");
+/// # Ok::<(), lattice_runtime::ros_args::RosArgsError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RosArgs {
     /// Remap rules in order; the first match applies.

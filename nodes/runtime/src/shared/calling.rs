@@ -29,6 +29,7 @@ const QOS: ServiceQos = ServiceQos {
 
 /// Reason for a call without reply.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum CallError {
     /// No server is discovered.
     #[error("no server of {name}")]
