@@ -56,6 +56,7 @@ pub use diagnostics::{Diagnostics, Level, WORKING};
 pub use discovered_graph::GraphEndpoint;
 pub use error::{PublishError, RuntimeError};
 pub use loopback_domain::LoopbackDomain;
+pub use names::renamed_topic;
 pub use node::Node;
 pub use process::Runtime;
 pub use publisher::{Publisher, RawPublisher};

@@ -105,7 +105,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             part.store(true, Ordering::Relaxed);
         }
     };
-    let maps = node.subscribe_undecoded("map", Qos::MAP, Shared, on_map)?;
+    let maps = node.subscribe_undecoded("voxel_map", Qos::MAP, Shared, on_map)?;
     let (to, missed, part) = (inbox.clone(), Arc::clone(&lost), map_lost);
     let on_update = move |update: Undecoded<LatticeMapUpdate>| {
         let bytes = update.bytes(|update| {
@@ -115,7 +115,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             part.store(true, Ordering::Relaxed);
         }
     };
-    let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Shared, on_update)?;
+    let updates = node.subscribe_undecoded("voxel_map_updates", Qos::DELTAS, Shared, on_update)?;
     let on_cloud = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
     let clouds = node.subscribe("headset/points", Qos::SENSOR, Dedicated, on_cloud)?;
     let on_session = inbox.counting(&lost, Event::Session, |_| 0);
