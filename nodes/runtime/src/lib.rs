@@ -25,6 +25,7 @@ mod loopback_domain;
 mod names;
 mod node;
 mod outbox;
+mod output_types;
 mod param_services;
 mod param_value;
 pub mod params;
