@@ -48,6 +48,7 @@ mod subscription;
 mod sync;
 mod task_thread;
 mod tf;
+mod tf_guard;
 mod timer;
 mod type_description;
 
@@ -69,4 +70,5 @@ pub use subscription::{Losses, Subscription, SubscriptionExecutor, Undecoded};
 pub use sync::lock;
 pub use task_thread::run_catching_panics;
 pub use tf::{StaticTfBroadcaster, TfBroadcaster};
+pub use tf_guard::TfGuard;
 pub use timer::Timer;
