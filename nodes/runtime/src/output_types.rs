@@ -97,7 +97,10 @@ mod tests {
         let outputs = OutputTypes::default();
         let peers = Arc::new(Peers::new("/map", "subscriber", log::Level::Info));
         outputs.add(&peers, MAP, &[publisher("/map", GRID)]);
-        assert!(outputs.on_found(&publisher("/map", GRID)).is_empty(), "logged");
+        assert!(
+            outputs.on_found(&publisher("/map", GRID)).is_empty(),
+            "logged"
+        );
         let ended = Arc::new(Peers::new("/b", "subscriber", log::Level::Info));
         outputs.add(&ended, MAP, &[]);
         drop(ended);

@@ -221,7 +221,11 @@ mod tests {
         assert!(!sent(&guard, "base_link", now).0);
         assert_eq!(lock(&guard.state).own.len(), 2);
         guard.own(&same);
-        assert_eq!(lock(&guard.state).own.len(), 2, "delivered ones are dropped");
+        assert_eq!(
+            lock(&guard.state).own.len(),
+            2,
+            "delivered ones are dropped"
+        );
     }
 
     #[test]

@@ -164,11 +164,7 @@ impl PoseInbox {
         Ok(vec![ins?])
     }
 
-    fn subscribe_tf(
-        &self,
-        node: &Node,
-        guard: &TfGuard,
-    ) -> Result<[Subscription; 2], NodeError> {
+    fn subscribe_tf(&self, node: &Node, guard: &TfGuard) -> Result<[Subscription; 2], NodeError> {
         let subscribe = |topic, qos, is_static| {
             let guard = guard.clone();
             self.subscribe(node, topic, qos, move |message| {

@@ -107,9 +107,12 @@ impl Viewer {
         let (sender, heard) = channel();
         let maps = sender.clone();
         let subscriptions = [
-            node.subscribe("voxel_map", Qos::MAP, SubscriptionExecutor::Shared, move |m| {
-                drop(maps.send(MapEvent::Map(m)))
-            }),
+            node.subscribe(
+                "voxel_map",
+                Qos::MAP,
+                SubscriptionExecutor::Shared,
+                move |m| drop(maps.send(MapEvent::Map(m))),
+            ),
             node.subscribe(
                 "voxel_map_updates",
                 Qos::DELTAS,

@@ -231,7 +231,8 @@ fn the_protocols_own_client_sees_nodes_elsewhere_come_and_go() {
         known.get("publishedTopics /from_peer") == Some(&peer.into())
             && known.get("subscribedTopics /to_peer") == Some(&peer.into())
             && known.get("advertisedServices /robot/peer/get_parameters") == Some(&peer.into())
-            && known.get("subscribedTopics /voxel_map") == Some(&["/viewer_server"].as_slice().into())
+            && known.get("subscribedTopics /voxel_map")
+                == Some(&["/viewer_server"].as_slice().into())
     });
     assert!(!known.keys().any(|name| name.starts_with("removed")));
     drop((ours, theirs, node));

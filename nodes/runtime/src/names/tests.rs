@@ -90,7 +90,11 @@ fn a_rule_with_a_former_name_applies_to_the_new_one() {
         ("map:=/old voxel_map:=/new", "voxel_map", "/new"),
         ("/robot/map:=/old", "voxel_map", "/old"),
         ("map:=/old", "voxel_map_updates", "/robot/voxel_map_updates"),
-        ("map_updates:=updates", "voxel_map_updates", "/robot/updates"),
+        (
+            "map_updates:=updates",
+            "voxel_map_updates",
+            "/robot/updates",
+        ),
         ("mapper:map:=a map:=b", "voxel_map", "/robot/a"),
         ("other:map:=a", "voxel_map", "/robot/voxel_map"),
         ("rosservice://map:=a", "voxel_map", "/robot/voxel_map"),
