@@ -54,7 +54,7 @@ fn a_log_of_before_is_played_under_the_new_name() {
     let topics = [("/map", LatticeMap::TYPE), ("/nav2/map", GRID)];
     let [ours, _] = topics.map(|(name, of)| writer.add_topic(topic(name, of)).unwrap());
     let map = LatticeMap {
-        epoch: 7,
+        sequence: 7,
         ..LatticeMap::default()
     };
     let bytes = cdr::to_vec(&map).unwrap();
@@ -74,6 +74,6 @@ fn a_log_of_before_is_played_under_the_new_name() {
         &mut player,
         &["/map (lattice_msgs/msg/LatticeMap) of this log is published as /voxel_map"],
     );
-    assert_eq!(maps.recv_timeout(PATIENCE).unwrap().epoch, 7);
+    assert_eq!(maps.recv_timeout(PATIENCE).unwrap().sequence, 7);
     assert!(player.wait().unwrap().success());
 }
