@@ -2,11 +2,16 @@
 
 use std::sync::Arc;
 use std::sync::mpsc::channel;
+use std::time::Duration;
 
 use lattice_bag::{BagWriter, Storage, TopicSpec, WriterOptions};
 use lattice_msgs::RosMessage;
 use lattice_msgs::cdr;
+use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::lattice::LatticeMap;
+use lattice_msgs::nav_msgs::Odometry;
+use lattice_msgs::tf2_msgs::TFMessage;
+use lattice_nodes::convert::geometry;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{LoopbackDomain, SubscriptionExecutor};
 
@@ -76,4 +81,42 @@ fn a_log_of_before_is_played_under_the_new_name() {
     );
     assert_eq!(maps.recv_timeout(PATIENCE).unwrap().sequence, 7);
     assert!(player.wait().unwrap().success());
+}
+
+#[test]
+fn a_second_parent_of_the_base_is_named_with_the_parameter() {
+    let domain = LoopbackDomain::take().unwrap();
+    let peer = peer(&domain);
+    let node = peer.node("wheels").unwrap();
+    let odom = TransformStamped {
+        header: geometry::header("odom", 1),
+        child_frame_id: "base_link".to_owned(),
+        ..TransformStamped::default()
+    };
+    let tf = node.publisher("/tf", Qos::TF).unwrap();
+    let poses = node.publisher("odom", Qos::DEFAULT).unwrap();
+    let mut stamp_ns = 0;
+    let _drive = peer.timer(Duration::from_millis(50), move || {
+        stamp_ns += 50_000_000;
+        let transforms = vec![odom.clone()];
+        tf.publish(TFMessage { transforms }).unwrap();
+        let mut pose = Odometry {
+            header: geometry::header("map", stamp_ns),
+            child_frame_id: "base_link".to_owned(),
+            ..Odometry::default()
+        };
+        pose.pose.pose.orientation.w = 1.0;
+        poses.publish(pose).unwrap();
+    });
+    let given = "node enu_transformer --ros-args -p ins.source:=odometry -p ins.topic:=odom";
+    let mut transformer = start(&domain, &given.split(' ').collect::<Vec<_>>());
+    expect(
+        &mut transformer,
+        &[
+            "map -> base_link is not published: another node publishes odom -> base_link, and a frame has one parent; \
+             set odom_frame: odom to publish map -> odom, or publish_tf: false",
+        ],
+    );
+    transformer.kill().unwrap();
+    transformer.wait().unwrap();
 }
