@@ -24,7 +24,7 @@ pub struct MapLosses {
 }
 
 impl MapLosses {
-    /// Subscribes to `map` and `map_updates`; chunks become events.
+    /// Subscribes to `voxel_map` and `voxel_map_updates`; chunks become events.
     pub fn subscribe<E: Send + 'static>(
         &self,
         node: &Node,
@@ -32,7 +32,7 @@ impl MapLosses {
         map: fn(Undecoded<LatticeMap>) -> E,
         update: fn(Undecoded<LatticeMapUpdate>) -> E,
     ) -> Result<[Subscription; 2], RuntimeError> {
-        self.subscribe_to(node, ["map", "map_updates"], inbox, map, update)
+        self.subscribe_to(node, ["voxel_map", "voxel_map_updates"], inbox, map, update)
     }
 
     /// Subscribes to topics with other names.

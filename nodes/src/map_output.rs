@@ -13,7 +13,7 @@ use lattice_runtime::{Node, Publisher, RuntimeError, Server, Subscription, Subsc
 /// Keyframe chunks per update period: 3 MB.
 const CHUNKS_PER_ROUND: usize = 50;
 
-/// Publishers of `map` and `map_updates`, with pending chunks.
+/// Publishers of `voxel_map` and `voxel_map_updates`, with pending chunks.
 pub struct MapOutput {
     map: Publisher<LatticeMap>,
     updates: Publisher<LatticeMapUpdate>,
@@ -38,8 +38,8 @@ impl MapOutput {
     /// Creates the map topics, and the topic and service for keyframe requests.
     pub fn open(node: &Node) -> Result<(Self, KeyframeRequests), RuntimeError> {
         let output = Self {
-            map: node.publisher("map", Qos::MAP)?,
-            updates: node.publisher("map_updates", Qos::DELTAS)?,
+            map: node.publisher("voxel_map", Qos::MAP)?,
+            updates: node.publisher("voxel_map_updates", Qos::DELTAS)?,
             asked: Arc::default(),
             pending: VecDeque::new(),
             updates_lost: 0,

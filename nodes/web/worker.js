@@ -28,7 +28,7 @@ const wanted = new Set(["tf", "static", "map", "updates", "diagnostics", "calibr
 
 // Decoder of each channel, by type and topic suffix.
 const KINDS = [
-  ["map", "lattice_msgs/msg/LatticeMap", new RegExp(`(^|/)map${THIN}$`)],
+  ["map", "lattice_msgs/msg/LatticeMap", new RegExp(`map${THIN}$`)],
   ["free", "lattice_msgs/msg/LatticeMap", /(^|\/)free$/],
   ["updates", "lattice_msgs/msg/LatticeMapUpdate", new RegExp(`updates${THIN}$`)],
   ["static", "tf2_msgs/msg/TFMessage", /tf_static$/],

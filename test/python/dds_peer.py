@@ -121,7 +121,7 @@ class Markers:
 
 
 class Map:
-    """Chunks of `map`, by the state that they belong to."""
+    """Chunks of `voxel_map`, by the state that they belong to."""
 
     def __init__(self):
         self.states, self.newest_ns = {}, 0
@@ -187,7 +187,7 @@ def run_map(scenario, directory):
     )
 
     late, whole = Peer(scenario["domain"]), Map()
-    late.reader("rt/map", ros.LatticeMap, qos(500, latched=True), whole)
+    late.reader("rt/voxel_map", ros.LatticeMap, qos(500, latched=True), whole)
     late.until(
         lambda: whole.points() >= expected.points,
         lambda: f"{whole.points()} of {expected.points} points in map, {len(whole.states)} states",
@@ -239,7 +239,7 @@ def run_graph(scenario, _directory):
     poses = peer.writer("rt/ins/odometry", ros.Odometry, qos(200))
     peer.reader("rt/tf", ros.TFMessage, qos(100), on_tf)
     peer.reader("rt/diagnostics", ros.DiagnosticArray, qos(10), on_diagnostics)
-    peer.reader("rt/map", ros.LatticeMap, qos(500, latched=True), whole)
+    peer.reader("rt/voxel_map", ros.LatticeMap, qos(500, latched=True), whole)
     request = peer.writer(f"rq/{service}Request", ros.TriggerRequest, qos(10))
     peer.reader(f"rr/{service}Reply", ros.TriggerResponse, qos(10), replies.append)
     peer.until_matched()
@@ -266,7 +266,7 @@ def run_graph(scenario, _directory):
         lambda: poses_in() == str(ahead + len(poses_sent)) and "lattice_mapper: map" in tasks,
         lambda: f"diagnostics of {sorted(tasks)}, {poses_in()} poses in",
     )
-    # The keyframe for the new reader of `map`, then the one asked for.
+    # The keyframe for the new reader of `voxel_map`, then the one asked for.
     peer.until(lambda: whole.whole(), lambda: "no map for a new reader")
     client, number, asked_ns = 0x0123_4567_89AB_CDEF, 42, time.time_ns()
     request.write(ros.TriggerRequest(client, number, 0))

@@ -34,7 +34,7 @@ CHUNK_VOXELS, CHUNKS = 5000, 70
 GARBAGE = {
     "sensor_msgs/msg/PointCloud2": ["left/points", "points_enu", "headset/points"],
     "novatel_oem7_msgs/msg/INSPVAX": ["novatel/oem7/inspvax"],
-    "lattice_msgs/msg/LatticeMapUpdate": ["map_updates"],
+    "lattice_msgs/msg/LatticeMapUpdate": ["voxel_map_updates"],
     "vision_msgs/msg/LabelInfo": ["headset/label_info"],
     "tf2_msgs/msg/TFMessage": ["tf", "tf_static"],
 }
@@ -143,8 +143,8 @@ class Topics:
             for topic in topics:
                 writer = participant.writer(f"rt/{topic}", kind, qos(10, topic in LATCHED))
                 self.writers.append((writer, kind))
-        self.maps = self.forger.writer("rt/map", ros.LatticeMap, qos(CHUNKS, latched=True))
-        self.forger.reader("rt/map", ros.LatticeMap, qos(CHUNKS), self.hear)
+        self.maps = self.forger.writer("rt/voxel_map", ros.LatticeMap, qos(CHUNKS, latched=True))
+        self.forger.reader("rt/voxel_map", ros.LatticeMap, qos(CHUNKS), self.hear)
         self.clouds = self.forger.writer("rt/headset/points", ros.PointCloud2, qos(10))
 
     def hear(self, chunk):

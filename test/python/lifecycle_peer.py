@@ -50,7 +50,7 @@ class Manager:
             self.calls[name] = Calls(self.peer, f"{NODE}/{name}", *ros.NODE_SERVICES[name])
         self.peer.until_matched()
         self.points = self.peer.writer("rt/points_enu", ros.PointCloud2, qos(5))
-        self.peer.reader("rt/map", ros.LatticeMap, qos(500, latched=True), self.on_map)
+        self.peer.reader("rt/voxel_map", ros.LatticeMap, qos(500, latched=True), self.on_map)
 
     def on_event(self, event):
         self.events.append([event.transition.label, event.start_state.label, event.goal_state.label])
@@ -83,7 +83,7 @@ class Manager:
 
     def meets_mapper(self):
         """Waits until the mapper hears our cloud topic and we its map."""
-        topics = ("rt/points_enu", "rt/map", "rt/map_origin")
+        topics = ("rt/points_enu", "rt/voxel_map", "rt/map_origin")
         self.peer.until(
             lambda: all(self.peer.matched.get(topic) for topic in topics),
             lambda: f"endpoints matched: {self.peer.matched}",
@@ -109,7 +109,7 @@ def main():
     said["at first"] = [manager.ask("get_state").label, manager.transitions()]
     said["activate too early"] = manager.change("activate")
     said["unknown"] = manager.change("transition_success")
-    assert not manager.peer.matched.get("rt/map"), "an unconfigured node has no topics"
+    assert not manager.peer.matched.get("rt/voxel_map"), "an unconfigured node has no topics"
     # Latched once, for an inactive node.
     origin = manager.peer.writer("rt/map_origin", ros.GeoPointStamped, qos(1, latched=True))
     origin.write(ros.GeoPointStamped(header(0, "earth"), ros.GeoPoint(48.1, 11.5, 515.0)))
@@ -129,7 +129,7 @@ def main():
     said["deactivate"] = manager.change("deactivate")
     said["cleanup"] = manager.change("cleanup")
     said["set again"] = manager.set("max_voxels", 2000)
-    manager.peer.until(lambda: not manager.peer.matched["rt/map"], lambda: "the map is still there")
+    manager.peer.until(lambda: not manager.peer.matched["rt/voxel_map"], lambda: "the map is still there")
     said["again"] = [manager.change("configure"), manager.change("activate")]
     manager.meets_mapper()
     manager.map_of(1)

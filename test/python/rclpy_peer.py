@@ -124,7 +124,7 @@ def main():
     # The answers are on their way.
     peer.until(lambda: Path(scenario["answered"]).exists(), "no answer came back")
     found = dict(peer.get_topic_names_and_types())
-    said["topics"] = {name: found.get(name) for name in ("/map_centers", "/map")}
+    said["topics"] = {name: found.get(name) for name in ("/map_centers", "/voxel_map")}
     said["nodes"] = sorted(peer.get_node_names())
     services = peer.get_service_names_and_types_by_node(peer.of, "/")
     said["services"] = sorted(name.rsplit("/", 1)[1] for name, _ in services)

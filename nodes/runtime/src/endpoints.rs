@@ -8,6 +8,7 @@ use futures::StreamExt;
 use futures::stream::BoxStream;
 
 use super::discovered_graph::DiscoveredGraph;
+use super::output_types::OutputTypes;
 use super::peers::Peers;
 use super::port::{EndpointId, PortEvent};
 use super::remote::{GraphRole, RemotePublisher};
@@ -24,6 +25,7 @@ const MAX_REMOTES: usize = 8192;
 pub(crate) struct Endpoints {
     pub remotes: Remotes,
     pub discovered_graph: DiscoveredGraph,
+    outputs: OutputTypes,
     inner: Mutex<Inner>,
 }
 
@@ -55,6 +57,11 @@ impl Endpoints {
         }
     }
 
+    /// Warns once if another process publishes another type on the topic of this publisher, now or later.
+    pub(crate) fn watch_type(&self, peers: &Arc<Peers>, type_name: &str) {
+        self.outputs.add(peers, type_name, &self.remotes.all());
+    }
+
     /// Dispatches events until the task is dropped.
     pub(crate) async fn watch(self: Arc<Self>, mut events: BoxStream<'static, PortEvent>) {
         while let Some(event) = events.next().await {
@@ -77,7 +84,12 @@ impl Endpoints {
             } => {
                 let (role, topic) = (GraphRole::Publisher, &publisher.topic);
                 self.discovered_graph.add(peer, role, topic, node);
-                return self.remotes.add(peer, *publisher);
+                // Added first, so that an output created meanwhile finds it.
+                self.remotes.add(peer, (*publisher).clone());
+                for line in self.outputs.on_found(&publisher) {
+                    log::warn!("{line}");
+                }
+                return;
             }
             PortEvent::FoundOther {
                 peer,

@@ -11,24 +11,28 @@ use super::node::Node;
 use super::publisher::Publisher;
 use super::qos::Qos;
 use super::sync::lock;
+use super::tf_guard::TfGuard;
 
 /// Broadcaster of dynamic transforms, on `/tf`.
 #[derive(Clone)]
 pub struct TfBroadcaster {
     publisher: Publisher<TFMessage>,
+    guard: TfGuard,
 }
 
 impl TfBroadcaster {
     /// Creates a broadcaster on the node's `/tf`.
-    pub fn new(node: &Node) -> Result<Self, RuntimeError> {
+    pub fn new(node: &Node, guard: &TfGuard) -> Result<Self, RuntimeError> {
         Ok(Self {
             publisher: node.publisher("/tf", Qos::TF)?,
+            guard: guard.clone(),
         })
     }
 
-    /// Publishes transforms at their stamps.
-    pub fn send(&self, transforms: Vec<TransformStamped>) -> Result<(), PublishError> {
-        self.publisher.publish(TFMessage { transforms })
+    /// Publishes transforms at their stamps, except those into frames whose parent another node publishes.
+    pub fn send(&self, mut transforms: Vec<TransformStamped>) -> Result<(), PublishError> {
+        self.guard.retain(&mut transforms);
+        publish(&self.publisher, &self.guard, transforms)
     }
 }
 
@@ -36,19 +40,22 @@ impl TfBroadcaster {
 #[derive(Clone)]
 pub struct StaticTfBroadcaster {
     publisher: Publisher<TFMessage>,
+    guard: TfGuard,
     all: Arc<Mutex<BTreeMap<String, TransformStamped>>>,
 }
 
 impl StaticTfBroadcaster {
     /// Creates a broadcaster on the node's `/tf_static`. One per node: two would replace each other's message.
-    pub fn new(node: &Node) -> Result<Self, RuntimeError> {
+    pub fn new(node: &Node, guard: &TfGuard) -> Result<Self, RuntimeError> {
         Ok(Self {
             publisher: node.publisher("/tf_static", Qos::TF_STATIC)?,
+            guard: guard.clone(),
             all: Arc::default(),
         })
     }
 
-    /// Adds transforms, or replaces those of the same child frame, and publishes all.
+    /// Adds transforms, or replaces those of the same child frame, and publishes all, except those into frames
+    /// whose parent another node publishes.
     pub fn send(
         &self,
         transforms: impl IntoIterator<Item = TransformStamped>,
@@ -59,7 +66,22 @@ impl StaticTfBroadcaster {
                 .into_iter()
                 .map(|t| (t.child_frame_id.clone(), t)),
         );
-        let transforms = all.values().cloned().collect();
-        self.publisher.publish(TFMessage { transforms })
+        let mut transforms = all.values().cloned().collect();
+        self.guard.retain(&mut transforms);
+        publish(&self.publisher, &self.guard, transforms)
     }
+}
+
+/// Publishes transforms, if any, as a message of this node.
+fn publish(
+    publisher: &Publisher<TFMessage>,
+    guard: &TfGuard,
+    transforms: Vec<TransformStamped>,
+) -> Result<(), PublishError> {
+    if transforms.is_empty() {
+        return Ok(());
+    }
+    let message = Arc::new(TFMessage { transforms });
+    guard.own(&message);
+    publisher.publish(message)
 }

@@ -24,7 +24,7 @@ use lattice_bag::{BagQos, BagReader, Player, STATIC_DEPTH, TopicInfo};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::{Durability, Qos, Reliability};
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Node, RawPublisher};
+use lattice_runtime::{Node, RawPublisher, renamed_topic};
 use lockstep::Lockstep;
 use parameters::Settings;
 use playback::{Playback, STATE_PERIOD};
@@ -166,12 +166,18 @@ impl PlayerReport {
     }
 }
 
-/// Creates a publisher per topic, with the recorded QoS unless a parameter overrides it.
+/// Creates a publisher per topic, with the recorded QoS unless a parameter overrides it. Topics under former names
+/// of ours are published under the present ones.
 fn open_topics(node: &Node, player: &Player) -> Result<Vec<RawPublisher>, NodeError> {
     let mut publishers = Vec::new();
     for topic in player.topics() {
         let info = &topic.info;
-        let resolved = node.resolve(&info.name)?;
+        let renamed = renamed_topic(&info.name, &info.type_name);
+        if let Some(new) = &renamed {
+            let (old, of) = (&info.name, &info.type_name);
+            log::info!("{old} ({of}) of this log is published as {new}, the present name");
+        }
+        let resolved = node.resolve(renamed.as_ref().unwrap_or(&info.name))?;
         let qos = offered(info).with_overrides(node.params(), &resolved, &info.name)?;
         let hash = type_hash(info);
         publishers.push(node.raw_publisher(&resolved, &info.type_name, hash.as_deref(), qos)?);

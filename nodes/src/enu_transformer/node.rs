@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::geographic_msgs::GeoPointStamped;
-use lattice_msgs::geometry_msgs::{PoseStamped, PoseWithCovarianceStamped};
+use lattice_msgs::geometry_msgs::{PoseStamped, PoseWithCovarianceStamped, TransformStamped};
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX};
 use lattice_msgs::sensor_msgs::{Imu, NavSatFix, PointCloud2};
@@ -23,7 +23,7 @@ use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
     Clock, Diagnostics, Level, Losses, Node, Publisher, Runtime, StaticTfBroadcaster, Subscription,
-    SubscriptionExecutor, TfBroadcaster,
+    SubscriptionExecutor, TfBroadcaster, TfGuard,
 };
 
 /// Event for the compute thread.
@@ -49,13 +49,14 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let settings = Settings::from_params(params)?;
     let taken = settings.taken();
     let source = settings.transformer.ins.source;
+    let guard = TfGuard::new(remedy(&settings.transformer));
     let [lost, lost_poses] = [(); 2].map(|()| Arc::new(AtomicU64::new(0)));
     let (lost_clouds, losses) = (Losses::default(), Losses::default());
     let mut compute_state = ComputeState {
         lost_clouds: lost_clouds.clone(),
         losses: losses.clone(),
         machine: EnuTransformer::new(settings.transformer),
-        outputs: Outputs::open(&node)?,
+        outputs: Outputs::open(&node, &guard)?,
         clock: node.clock(),
         diagnostics: node.diagnostics(),
         lost: Arc::clone(&lost),
@@ -78,10 +79,13 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         inbox: inbox.clone(),
         lost: lost_poses,
     };
+    // Before the poses: transforms of others decide which ones are published.
+    let transforms = poses.subscribe_tf(&node, &guard)?;
     let (ins, imu) = (&settings.ins_topic, &settings.imu_topic);
     let mut inputs = poses.subscribe_ins(&node, source, ins, imu)?;
     let of_ins = Some("ins.source and ins.topic");
     node.expect_publishers(&inputs, "the driver of the INS", of_ins, |_| true);
+    inputs.extend(transforms);
     for topic in settings.points_topics {
         let name: Arc<str> = topic.as_str().into();
         let event = move |cloud| Event::Cloud(Arc::clone(&name), cloud);
@@ -101,10 +105,6 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         Some("points_topics"),
         is_raw,
     );
-    let transforms = |m| Event::Transforms(m, false);
-    inputs.push(poses.subscribe(&node, "/tf", Qos::TF, transforms)?);
-    let (latched, transforms) = (Qos::TF_STATIC_LISTENER, |m| Event::Transforms(m, true));
-    inputs.push(poses.subscribe(&node, "/tf_static", latched, transforms)?);
     losses.watch(inputs.iter().chain(&clouds));
     let ticks = inbox.clone();
     let ticks = runtime.timer(Duration::from_millis(200), move || {
@@ -121,6 +121,15 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         compute.finish_with(Event::Finish);
         Box::new(())
     }))
+}
+
+/// Parameter to set where another node publishes the parent of a frame of ours.
+fn remedy(options: &TransformerOptions) -> impl Fn(&TransformStamped, &str) -> String + use<> {
+    let (map, base) = (options.map_frame.clone(), options.base_frame.clone());
+    move |ours, root| match ours.child_frame_id == base && root != map {
+        true => format!("odom_frame: {root} to publish {map} -> {root}, or publish_tf: false"),
+        false => "publish_tf: false".to_owned(),
+    }
 }
 
 /// Inbox for poses and transforms, with the count of rejected ones.
@@ -155,12 +164,26 @@ impl PoseInbox {
         Ok(vec![ins?])
     }
 
+    fn subscribe_tf(&self, node: &Node, guard: &TfGuard) -> Result<[Subscription; 2], NodeError> {
+        let subscribe = |topic, qos, is_static| {
+            let guard = guard.clone();
+            self.subscribe(node, topic, qos, move |message| {
+                guard.on_message(&message, is_static);
+                Event::Transforms(message, is_static)
+            })
+        };
+        Ok([
+            subscribe("/tf", Qos::TF, false)?,
+            subscribe("/tf_static", Qos::TF_STATIC_LISTENER, true)?,
+        ])
+    }
+
     fn subscribe<M: RosMessage>(
         &self,
         node: &Node,
         topic: &str,
         qos: Qos,
-        event: fn(Arc<M>) -> Event,
+        event: impl Fn(Arc<M>) -> Event + Send + 'static,
     ) -> Result<Subscription, NodeError> {
         // Poses count no bytes: clouds must not displace them.
         let (inbox, lost) = (self.inbox.clone(), Arc::clone(&self.lost));
@@ -186,11 +209,11 @@ struct Outputs {
 }
 
 impl Outputs {
-    fn open(node: &Node) -> Result<Self, NodeError> {
+    fn open(node: &Node, guard: &TfGuard) -> Result<Self, NodeError> {
         Ok(Self {
             points: node.publisher("points_enu", Qos::SCANS)?,
-            tf: TfBroadcaster::new(node)?,
-            tf_static: StaticTfBroadcaster::new(node)?,
+            tf: TfBroadcaster::new(node, guard)?,
+            tf_static: StaticTfBroadcaster::new(node, guard)?,
             origin: node.publisher("map_origin", Qos::LATCHED)?,
         })
     }

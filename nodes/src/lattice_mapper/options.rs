@@ -34,7 +34,7 @@ pub struct MapperOptions {
     pub max_cloud_points: usize,
     /// Label conversion for label counts in each voxel; `None`: labels are not kept.
     pub labels: Option<LabelOptions>,
-    /// Largest serialized message of `map`, `map_updates` and `free`, bytes.
+    /// Largest serialized message of `voxel_map`, `voxel_map_updates` and `free`, bytes.
     pub chunk_bytes: usize,
     /// Payload of a voxel: one bit, or count and mean point.
     pub payload: MapPayload,

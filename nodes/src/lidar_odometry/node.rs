@@ -18,6 +18,7 @@ use crate::start::{Finish, NodeError};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
     Diagnostics, Level, Losses, Node, Publisher, Runtime, SubscriptionExecutor, TfBroadcaster,
+    TfGuard,
 };
 
 /// Event for the compute thread.
@@ -45,8 +46,9 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     );
     let (lost, motion_lost) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0)));
     let losses = Losses::default();
+    let guard = TfGuard::new(|_, _| "publish_tf: false".to_owned());
     let mut shell = Shell {
-        outputs: Outputs::open(&node, options.publish_tf)?,
+        outputs: Outputs::open(&node, options.publish_tf.then_some(&guard))?,
         path: ThinPath::new(&options.odom_frame),
         machine: LidarOdometry::new(options),
         diagnostics: node.diagnostics(),
@@ -62,6 +64,21 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         move |event| shell.on(event),
     )?;
     let inbox = compute.inbox();
+    let mut transforms = Vec::new();
+    for (topic, qos, is_static) in [
+        ("/tf", Qos::TF, false),
+        ("/tf_static", Qos::TF_STATIC_LISTENER, true),
+    ] {
+        let (inbox, guard) = (inbox.clone(), guard.clone());
+        // Transforms count no bytes: clouds must not keep them out.
+        let handler = move |message: Arc<TFMessage>| {
+            guard.on_message(&message, is_static);
+            if !inbox.send(Event::Transforms(message, is_static), 0) {
+                log::warn!("the inbox is full: transforms are lost");
+            }
+        };
+        transforms.push(node.subscribe(topic, qos, SubscriptionExecutor::Shared, handler)?);
+    }
     let hand_over = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
     let clouds = vec![node.subscribe(
         POINTS,
@@ -78,20 +95,6 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         node.subscribe(IMU, Qos::INS, SubscriptionExecutor::Shared, on_imu)?,
         node.subscribe(WHEELS, Qos::INS, SubscriptionExecutor::Shared, on_wheels)?,
     );
-    let mut transforms = Vec::new();
-    for (topic, qos, is_static) in [
-        ("/tf", Qos::TF, false),
-        ("/tf_static", Qos::TF_STATIC_LISTENER, true),
-    ] {
-        let inbox = inbox.clone();
-        // Transforms count no bytes: clouds must not keep them out.
-        let handler = move |message: Arc<TFMessage>| {
-            if !inbox.send(Event::Transforms(message, is_static), 0) {
-                log::warn!("the inbox is full: transforms are lost");
-            }
-        };
-        transforms.push(node.subscribe(topic, qos, SubscriptionExecutor::Shared, handler)?);
-    }
     log::info!("{taken}");
     Ok(Box::new(move || {
         drop((clouds, motion, transforms));
@@ -110,15 +113,15 @@ struct Outputs {
 }
 
 impl Outputs {
-    fn open(node: &Node, publish_tf: bool) -> Result<Self, NodeError> {
+    /// `guard`: of the transforms, if they are published.
+    fn open(node: &Node, guard: Option<&TfGuard>) -> Result<Self, NodeError> {
         Ok(Self {
             odometry: node.publisher("odometry", Qos::DEFAULT)?,
             odometry_ok: node.publisher("odometry_ok", Qos::DEFAULT)?,
             path: node.publisher("path", Qos::LATCHED)?,
-            tf: match publish_tf {
-                true => Some(TfBroadcaster::new(node)?),
-                false => None,
-            },
+            tf: guard
+                .map(|guard| TfBroadcaster::new(node, guard))
+                .transpose()?,
         })
     }
 }

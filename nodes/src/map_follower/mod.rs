@@ -1,4 +1,4 @@
-//! Follower of `map` and `map_updates`: keyframes, deltas, gaps and late joining.
+//! Follower of `voxel_map` and `voxel_map_updates`: keyframes, deltas, gaps and late joining.
 
 mod followed;
 mod followed_map;

@@ -1,7 +1,7 @@
 //! Merging of maps of several robots.
 //!
 //! Each voxel is the integer sum over the robots' maps, so the order of
-//! messages does not matter. The input of each robot is its `map`: counts, mean offsets
+//! messages does not matter. The input of each robot is its `voxel_map`: counts, mean offsets
 //! in the unit of the message, and the most frequent label.
 
 pub mod node;
@@ -26,7 +26,7 @@ use crate::map_follower::{FollowError, Followed, MapFollower};
 /// Options of a merger.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MergerOptions {
-    /// Names of the robots: their maps are `/NAME/map`.
+    /// Names of the robots: their maps are `/NAME/voxel_map`.
     pub robots: Vec<String>,
     /// Frame that all maps must be in.
     pub map_frame: String,

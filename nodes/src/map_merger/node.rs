@@ -81,7 +81,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let inbox = compute.inbox();
     let mut subscriptions: Vec<[Subscription; 2]> = Vec::new();
     for (i, (robot, losses)) in robots.iter().zip(&losses).enumerate() {
-        let topics = [format!("/{robot}/map"), format!("/{robot}/map_updates")];
+        let topics = [
+            format!("/{robot}/voxel_map"),
+            format!("/{robot}/voxel_map_updates"),
+        ];
         let map = move |chunk| Event::Map(i, chunk);
         let update = move |chunk| Event::Update(i, chunk);
         subscriptions.push(losses.subscribe_to(&node, topics, &inbox, map, update)?);

@@ -9,12 +9,12 @@ use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
-    "robots" fixed(options::TOPIC): "Names of the robots: their maps are /NAME/map and /NAME/map_updates.";
+    "robots" fixed(options::TOPIC): "Names of the robots: their maps are /NAME/voxel_map and /NAME/voxel_map_updates.";
     "datum_m" fixed("keys are counted from it"): "Origin of the keys of the merged map: the lattice point nearest to this position in the map frame. Keys reach a million cells in every direction.";
     "max_voxels": "Voxel limit of the merged map, and of each robot's.";
     "labels" fixed("the map is made with it"): "Labels of the merged map: own (those of the maps; of each robot only the most frequent one of a voxel is known), robots (the robots themselves, with their names on label_info), or none.";
-    "chunk_bytes": "Largest message of map and map_updates, bytes.";
-    "update_period_s": "Period of map_updates.";
+    "chunk_bytes": "Largest message of voxel_map and voxel_map_updates, bytes.";
+    "update_period_s": "Period of voxel_map_updates.";
 };
 
 const MAX_ROBOTS: usize = 1000;

@@ -27,7 +27,8 @@ use lattice_runtime::SubscriptionExecutor::{Dedicated, Shared};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Losses, Reply, Runtime, Undecoded, lock,
+    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Losses, Reply, Runtime, TfGuard,
+    Undecoded, lock,
 };
 
 /// Period of the diagnostic status.
@@ -68,11 +69,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let lost = Arc::new(AtomicU64::new(0));
     let map_lost = Arc::new(AtomicBool::new(false));
     let losses = Losses::default();
+    let guard = TfGuard::new(|_, _| "another headset_frame".to_owned());
     let mut compute_state = ComputeState {
         losses: losses.clone(),
         machine: SemanticIcpServer::new(server),
         search: None,
-        outputs: Outputs::open(&node, &mapper)?,
+        outputs: Outputs::open(&node, &mapper, &guard)?,
         diagnostics: node.diagnostics(),
         clock: node.clock(),
         lost: Arc::clone(&lost),
@@ -105,7 +107,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             part.store(true, Ordering::Relaxed);
         }
     };
-    let maps = node.subscribe_undecoded("map", Qos::MAP, Shared, on_map)?;
+    let maps = node.subscribe_undecoded("voxel_map", Qos::MAP, Shared, on_map)?;
     let (to, missed, part) = (inbox.clone(), Arc::clone(&lost), map_lost);
     let on_update = move |update: Undecoded<LatticeMapUpdate>| {
         let bytes = update.bytes(|update| {
@@ -115,7 +117,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             part.store(true, Ordering::Relaxed);
         }
     };
-    let updates = node.subscribe_undecoded("map_updates", Qos::DELTAS, Shared, on_update)?;
+    let updates = node.subscribe_undecoded("voxel_map_updates", Qos::DELTAS, Shared, on_update)?;
+    let transforms = guard.subscribe(&node)?;
     let on_cloud = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
     let clouds = node.subscribe("headset/points", Qos::SENSOR, Dedicated, on_cloud)?;
     let on_session = inbox.counting(&lost, Event::Session, |_| 0);
@@ -162,7 +165,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         Ok(())
     });
     Ok(Box::new(move || {
-        drop((maps, updates, clouds, sessions, infos));
+        drop((maps, updates, transforms, clouds, sessions, infos));
         compute.finish_with(Event::Finish);
         thread.finish();
         drop(seconds);

@@ -3,7 +3,7 @@
 use lattice_msgs::calibration::CalibrationResult;
 use lattice_msgs::std_msgs::Empty;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Node, Publisher, TfBroadcaster};
+use lattice_runtime::{Node, Publisher, TfBroadcaster, TfGuard};
 
 use crate::start::NodeError;
 
@@ -16,10 +16,10 @@ pub(super) struct Outputs {
 
 impl Outputs {
     /// `mapper` receives keyframe requests.
-    pub(super) fn open(node: &Node, mapper: &str) -> Result<Self, NodeError> {
+    pub(super) fn open(node: &Node, mapper: &str, guard: &TfGuard) -> Result<Self, NodeError> {
         Ok(Self {
             calibration: node.publisher("calibration", Qos::latched(1))?,
-            tf: TfBroadcaster::new(node)?,
+            tf: TfBroadcaster::new(node, guard)?,
             request: node.publisher(&format!("{mapper}/request_keyframe"), Qos::DEFAULT)?,
         })
     }

@@ -31,7 +31,7 @@ pub fn serve_labelled(
     options: &ViewerOptions,
 ) -> io::Result<(Server, String)> {
     let broadcaster = Arc::new(Broadcaster::of_file(options.max_clients));
-    broadcaster.map_channels("/map", "/map_updates");
+    broadcaster.map_channels("/voxel_map", "/voxel_map_updates");
     if !names.is_empty() {
         let channel =
             broadcaster.channel::<LabelInfo>("/label_info", Class::Newest { depth: 1 }, true);

@@ -66,7 +66,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         report_file,
     } = Settings::from_params(params)?;
     let broadcaster = Arc::new(Broadcaster::new(viewer.max_clients));
-    broadcaster.map_channels(&node.resolve("map")?, &node.resolve("map_updates")?);
+    broadcaster.map_channels(
+        &node.resolve("voxel_map")?,
+        &node.resolve("voxel_map_updates")?,
+    );
     let one = Class::Newest { depth: 1 };
     let fixed_channel = broadcaster.channel::<TFMessage>(&node.resolve("/tf_static")?, one, true);
     let inputs = Arc::new(Inputs::default());

@@ -34,8 +34,8 @@ impl Growing {
         let lattice = Lattice::new(LatticeKind::Cubic, 0.001).unwrap();
         let mut mapper = LatticeMapper::new(MapperOptions::new(lattice), 7).unwrap();
         let broadcaster = Arc::new(Broadcaster::new(4));
-        broadcaster.channel::<LatticeMap>("/map", Class::Map, false);
-        broadcaster.channel::<LatticeMapUpdate>("/map_updates", Class::Updates, false);
+        broadcaster.channel::<LatticeMap>("/voxel_map", Class::Map, false);
+        broadcaster.channel::<LatticeMapUpdate>("/voxel_map_updates", Class::Updates, false);
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
         let server =
             Server::start(address, RequestAuth::default(), Arc::clone(&broadcaster)).unwrap();

@@ -89,7 +89,7 @@ proptest! {
 
 pub(super) fn server(max_clients: usize, auth: RequestAuth) -> (Server, Arc<Broadcaster>) {
     let broadcaster = Arc::new(Broadcaster::new(max_clients));
-    broadcaster.channel::<LatticeMap>("/map", Class::Map, false);
+    broadcaster.channel::<LatticeMap>("/voxel_map", Class::Map, false);
     broadcaster.channel::<TFMessage>("/tf", Class::Newest { depth: 2 }, false);
     broadcaster.channel::<TFMessage>("/tf_static", Class::Newest { depth: 1 }, true);
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));

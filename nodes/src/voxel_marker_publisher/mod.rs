@@ -32,7 +32,7 @@ const OVERHEAD_BYTES: usize = 256;
 /// Counters of messages received and markers published.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MarkerCounts {
-    /// Chunks of `map` and `map_updates` received.
+    /// Chunks of `voxel_map` and `voxel_map_updates` received.
     pub messages_in: u64,
     /// Chunks rejected as malformed or too large.
     pub messages_refused: u64,

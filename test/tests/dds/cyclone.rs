@@ -269,7 +269,7 @@ fn a_cyclone_peer_sees_the_type_hash_of_every_endpoint() {
     assert!(raw.iter().all(Result::is_ok));
     let topics = [
         "ros_discovery_info",
-        "rt/map",
+        "rt/voxel_map",
         "rt/points_enu",
         "rt/wrong",
         "rq/lattice_mapper/queryRequest",

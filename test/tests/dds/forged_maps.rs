@@ -125,10 +125,10 @@ fn a_forged_keyframe_lasts_until_the_next_update() {
     let _requests = requests.unwrap();
     let mut mapper = Mapper {
         machine: maps::mapper(maps::options(LatticeKind::Fcc, 0.125)),
-        maps: node.publisher("map", Qos::MAP).unwrap(),
-        updates: node.publisher("map_updates", Qos::DELTAS).unwrap(),
+        maps: node.publisher("voxel_map", Qos::MAP).unwrap(),
+        updates: node.publisher("voxel_map_updates", Qos::DELTAS).unwrap(),
     };
-    let forgery: Publisher<LatticeMap> = forger.publisher("map", Qos::MAP).unwrap();
+    let forgery: Publisher<LatticeMap> = forger.publisher("voxel_map", Qos::MAP).unwrap();
     while mapper.maps.subscriber_count() < followers.len()
         || mapper.updates.subscriber_count() < followers.len()
         || forgery.subscriber_count() < followers.len()

@@ -50,7 +50,7 @@ fn what_does_not_decode_is_in_diagnostics_and_report() {
     let (cloud, map) = (PointCloud2::TYPE, "lattice_msgs/msg/LatticeMapUpdate");
     let inputs = [
         ("/points_enu", cloud),
-        ("/map_updates", map),
+        ("/voxel_map_updates", map),
         ("/points", cloud),
     ];
     let inputs = inputs.map(|(topic, ros_type)| raw(topic, ros_type));
@@ -110,7 +110,7 @@ fn updates_that_find_the_publisher_full_are_counted_each() {
     let clouds = node.publisher("/points_enu", Qos::reliable(10)).unwrap();
     let qos = Qos::reliable(10_000);
     let heard = node.subscribe::<LatticeMapUpdate>(
-        "/map_updates",
+        "/voxel_map_updates",
         qos,
         SubscriptionExecutor::Dedicated,
         |_| {},

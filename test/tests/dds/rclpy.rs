@@ -103,7 +103,7 @@ fn reads_changes_and_answers(python: &Path) {
     assert!(found["sources"].as_u64().unwrap() > 1000, "{found}");
     assert_eq!(found["levels"], json!([["lattice_mapper", 0]]));
     assert_eq!(found["reset"], true);
-    let topics = json!({"/map_centers": [cloud], "/map": ["lattice_msgs/msg/LatticeMap"]});
+    let topics = json!({"/map_centers": [cloud], "/voxel_map": ["lattice_msgs/msg/LatticeMap"]});
     assert_eq!(found["topics"], topics);
     // The one that asked has ended.
     assert_eq!(found["nodes"], json!(["lattice_mapper", "peer"]));

@@ -183,9 +183,9 @@ fn a_merger_counts_what_it_refuses_and_has_no_room_for() {
     ] {
         let chunks = mapper.keyframe();
         sent += chunks.len() as u64;
-        merger.map(&format!("/{robot}/map"), &chunks);
+        merger.map(&format!("/{robot}/voxel_map"), &chunks);
         if robot == "far" {
-            merger.map("/far/map", &[malformed(&chunks[0])]);
+            merger.map("/far/voxel_map", &[malformed(&chunks[0])]);
         }
     }
     let expected = [
@@ -224,7 +224,7 @@ fn a_marker_publisher_counts_messages_gaps_and_markers() {
     };
     let keyframe = mapper.keyframe();
     assert_eq!(keyframe.len(), 1, "drawn in one step");
-    node.map("map", &keyframe);
+    node.map("voxel_map", &keyframe);
     machine.on_map(&keyframe[0]).unwrap();
     drawn(&mut machine);
     let point = |[x, y, z]: [f64; 3]| lattice_msgs::geometry_msgs::Point { x, y, z };
@@ -234,16 +234,16 @@ fn a_marker_publisher_counts_messages_gaps_and_markers() {
     });
     let update = mapper.take_update();
     assert_eq!(update.len(), 1);
-    node.update("map_updates", &update);
+    node.update("voxel_map_updates", &update);
     machine.on_update(&update[0]).unwrap();
     let counts = drawn(&mut machine);
     assert!(counts[3].1 > 0, "markers that go");
     // Refused, and behind a gap.
-    node.map("map", &[malformed(&keyframe[0])]);
+    node.map("voxel_map", &[malformed(&keyframe[0])]);
     insert(&mut mapper, &[[1.0; 3]]);
     mapper.take_update();
     insert(&mut mapper, &[[2.0; 3]]);
-    node.update("map_updates", &mapper.take_update());
+    node.update("voxel_map_updates", &mapper.take_update());
     let after = [
         ("messages_in", 4),
         ("messages_refused", 1),
@@ -263,7 +263,7 @@ fn messages_that_find_an_inbox_full_are_counted_each() {
     let chunks = mapper.keyframe();
     let (mut sent, mut refused) = (0, 0);
     while refused == 0 {
-        node.map("map", &vec![chunks[0].clone(); 200]);
+        node.map("voxel_map", &vec![chunks[0].clone(); 200]);
         sent += 200;
         // The numbers of a moment when nothing is on the way.
         refused = loop {
@@ -324,8 +324,8 @@ fn a_calibration_server_counts_what_it_refuses() {
     clouds(&[good(&[([1.0; 3], 7)])]);
     node.shows(&[("clouds_no_map", 1)]);
     let chunks = mapper.keyframe();
-    node.map("map", &chunks);
-    node.map("map", &[malformed(&chunks[0])]);
+    node.map("voxel_map", &chunks);
+    node.map("voxel_map", &[malformed(&chunks[0])]);
     node.shows(&[
         ("map_refused", 1),
         ("map_voxels", mapper.list().len() as u64),

@@ -44,7 +44,7 @@ fn nothing_is_drawn_at_the_end_that_nobody_sees() {
     let runtime = runtime(&domain, &["-p", &report_file]);
     let finish = node::start(&runtime, "voxel_marker_publisher").unwrap();
     let mapper_node = runtime.node("mapper").unwrap();
-    let maps: Publisher<LatticeMap> = mapper_node.publisher("map", Qos::MAP).unwrap();
+    let maps: Publisher<LatticeMap> = mapper_node.publisher("voxel_map", Qos::MAP).unwrap();
     for chunk in mapper().keyframe() {
         maps.publish(chunk).unwrap();
     }
@@ -84,7 +84,7 @@ fn all_budgets_of_markers_are_drawn_at_the_end() {
         )
         .unwrap();
     let finish = node::start(&runtime, "voxel_marker_publisher").unwrap();
-    let maps: Publisher<LatticeMap> = viewer.publisher("map", Qos::MAP).unwrap();
+    let maps: Publisher<LatticeMap> = viewer.publisher("voxel_map", Qos::MAP).unwrap();
     for chunk in mapper().keyframe() {
         maps.publish(chunk).unwrap();
     }

@@ -286,7 +286,7 @@ impl Branch {
     }
 
     fn matched(&mut self) -> CliResult {
-        for topic in ["map", "map_updates"] {
+        for topic in ["voxel_map", "voxel_map_updates"] {
             let line = format!("{}/{topic}: subscriber matched (1)", self.namespace);
             self.mapper.expect(&line)?;
             let line = format!("{}/{topic}: publisher matched (1)", self.namespace);

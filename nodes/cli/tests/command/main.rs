@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod bag_info;
+mod beside_nav2;
 mod browser;
 mod calibrate;
 mod demo;

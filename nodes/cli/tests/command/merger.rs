@@ -41,8 +41,8 @@ impl Listener {
         let (sender, heard) = channel();
         let maps = sender.clone();
         let (map, updates) = (
-            format!("{namespace}/map"),
-            format!("{namespace}/map_updates"),
+            format!("{namespace}/voxel_map"),
+            format!("{namespace}/voxel_map_updates"),
         );
         let subscriptions = [
             node.subscribe(&map, Qos::MAP, SubscriptionExecutor::Shared, move |m| {

@@ -130,7 +130,7 @@ fn files_are_checked_by_section() {
 }
 
 /// A runtime of another process than that of the nodes.
-fn peer(domain: &LoopbackDomain) -> Runtime {
+pub fn peer(domain: &LoopbackDomain) -> Runtime {
     let network = Network {
         domain_id: domain.id(),
         localhost_only: true,

@@ -199,8 +199,8 @@ fn a_recording_of_a_system_at_work_gives_the_same_map() {
     let topics = report["topics"].as_array().unwrap();
     for name in [
         "/left/points",
-        "/map",
-        "/map_updates",
+        "/voxel_map",
+        "/voxel_map_updates",
         "/voxel_markers",
         "/points_enu",
     ] {

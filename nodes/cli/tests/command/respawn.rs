@@ -107,11 +107,14 @@ impl Viewer {
         let (sender, heard) = channel();
         let maps = sender.clone();
         let subscriptions = [
-            node.subscribe("map", Qos::MAP, SubscriptionExecutor::Shared, move |m| {
-                drop(maps.send(MapEvent::Map(m)))
-            }),
             node.subscribe(
-                "map_updates",
+                "voxel_map",
+                Qos::MAP,
+                SubscriptionExecutor::Shared,
+                move |m| drop(maps.send(MapEvent::Map(m))),
+            ),
+            node.subscribe(
+                "voxel_map_updates",
                 Qos::DELTAS,
                 SubscriptionExecutor::Shared,
                 move |m| {

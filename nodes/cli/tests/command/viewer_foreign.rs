@@ -90,8 +90,8 @@ fn server() -> (Server, Value) {
     let broadcaster = Arc::new(Broadcaster::new(4));
     let mut all = Map::new();
     let map = known_map();
-    broadcaster.channel::<LatticeMap>("/map", Class::Map, false);
-    all.insert("/map".to_owned(), to_value(&map).unwrap());
+    broadcaster.channel::<LatticeMap>("/voxel_map", Class::Map, false);
+    all.insert("/voxel_map".to_owned(), to_value(&map).unwrap());
     let chunk = Entry {
         stamp_ns: 1,
         cdr: cdr::to_vec(&map).unwrap().into(),
@@ -231,7 +231,8 @@ fn the_protocols_own_client_sees_nodes_elsewhere_come_and_go() {
         known.get("publishedTopics /from_peer") == Some(&peer.into())
             && known.get("subscribedTopics /to_peer") == Some(&peer.into())
             && known.get("advertisedServices /robot/peer/get_parameters") == Some(&peer.into())
-            && known.get("subscribedTopics /map") == Some(&["/viewer_server"].as_slice().into())
+            && known.get("subscribedTopics /voxel_map")
+                == Some(&["/viewer_server"].as_slice().into())
     });
     assert!(!known.keys().any(|name| name.starts_with("removed")));
     drop((ours, theirs, node));
@@ -241,7 +242,7 @@ fn the_protocols_own_client_sees_nodes_elsewhere_come_and_go() {
             && known.contains_key("removedTopics /to_peer")
             && known.contains_key("removedServices /robot/peer/get_parameters")
     });
-    assert!(!known.contains_key("removedTopics /map"));
+    assert!(!known.contains_key("removedTopics /voxel_map"));
     client.kill().unwrap();
     client.wait().unwrap();
 }

@@ -1,9 +1,11 @@
 //! ROS names: expansion, remapping and validation as in rcl and rmw.
 
 mod remap;
+mod renamed;
 mod shown;
 
 pub(crate) use remap::{NameKind, RemapRule, RemapTarget, split_node};
+pub use renamed::renamed_topic;
 pub(crate) use shown::shown;
 
 use thiserror::Error;
@@ -49,7 +51,8 @@ pub(crate) fn is_identifier(text: &str) -> bool {
 
 /// Full name of a topic or service of the node, after the first matching remap rule.
 ///
-/// Supports `/absolute`, `relative`, `~/private`, `{node}`, `{ns}` and `{namespace}`.
+/// Supports `/absolute`, `relative`, `~/private`, `{node}`, `{ns}` and `{namespace}`. If no rule has the name of a
+/// renamed topic, the first one with its former name applies.
 pub(crate) fn resolve(
     kind: NameKind,
     name: &str,
@@ -57,16 +60,30 @@ pub(crate) fn resolve(
     namespace: &str,
     remaps: &[RemapRule],
 ) -> Result<String, NameError> {
-    let mut full = expand(name, node_name, namespace)?;
-    for rule in remaps.iter().filter(|rule| rule.applies_to(node_name)) {
-        let RemapTarget::Name { kind: of, from, to } = &rule.target else {
-            continue;
-        };
-        if (*of == NameKind::Any || *of == kind) && expand(from, node_name, namespace)? == full {
-            full = expand(to, node_name, namespace)?;
-            break;
+    let full = expand(name, node_name, namespace)?;
+    let rule_of = |full: &str| {
+        for rule in remaps.iter().filter(|rule| rule.applies_to(node_name)) {
+            let RemapTarget::Name { kind: of, from, to } = &rule.target else {
+                continue;
+            };
+            if (*of == NameKind::Any || *of == kind) && expand(from, node_name, namespace)? == full
+            {
+                return Ok(Some((from, to)));
+            }
+        }
+        Ok(None)
+    };
+    let mut rule = rule_of(&full)?;
+    if rule.is_none()
+        && kind == NameKind::Topic
+        && let Some(former) = renamed::former_name(&full)
+    {
+        rule = rule_of(&former)?;
+        if let Some((from, to)) = rule {
+            renamed::warn_of_rule(from, to);
         }
     }
+    let full = rule.map_or(Ok(full), |(_, to)| expand(to, node_name, namespace))?;
     validate_full_name(&full)?;
     Ok(full)
 }

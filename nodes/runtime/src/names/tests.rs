@@ -84,6 +84,31 @@ fn the_first_rule_that_matches_counts_and_both_sides_are_expanded() {
 }
 
 #[test]
+fn a_rule_with_a_former_name_applies_to_the_new_one() {
+    for (rules, name, expected) in [
+        ("map:=/old", "voxel_map", "/old"),
+        ("map:=/old voxel_map:=/new", "voxel_map", "/new"),
+        ("/robot/map:=/old", "voxel_map", "/old"),
+        ("map:=/old", "voxel_map_updates", "/robot/voxel_map_updates"),
+        (
+            "map_updates:=updates",
+            "voxel_map_updates",
+            "/robot/updates",
+        ),
+        ("mapper:map:=a map:=b", "voxel_map", "/robot/a"),
+        ("other:map:=a", "voxel_map", "/robot/voxel_map"),
+        ("rosservice://map:=a", "voxel_map", "/robot/voxel_map"),
+        ("map:=/old", "map", "/old"),
+        ("map:=/old", "map_centers", "/robot/map_centers"),
+    ] {
+        let found = topic(name, "/robot", rules);
+        assert_eq!(found.as_deref(), Ok(expected), "{name} by {rules}");
+    }
+    let service = resolved(NameKind::Service, "voxel_map", "/", "map:=/old");
+    assert_eq!(service.as_deref(), Ok("/voxel_map"));
+}
+
+#[test]
 fn long_and_odd_arguments_stay_readable() {
     assert_eq!(shown("a\nb"), "a\\nb");
     assert_eq!(shown(&"x".repeat(1000)).chars().count(), 161);

@@ -92,6 +92,7 @@ impl Shared {
             }
         }));
         self.endpoints.register(id, &peers);
+        self.endpoints.watch_type(&peers, ros_type);
         Ok(parts)
     }
 }

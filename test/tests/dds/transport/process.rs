@@ -14,7 +14,7 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{
-    PublishError, RuntimeError, StaticTfBroadcaster, SubscriptionExecutor, logging,
+    PublishError, RuntimeError, StaticTfBroadcaster, SubscriptionExecutor, TfGuard, logging,
 };
 use lattice_test::domain::TestDomain;
 
@@ -23,7 +23,8 @@ use super::{PATIENCE, Two, assert_counted, count_to, runtime, text, wait_until};
 #[test]
 fn static_transforms_go_in_one_message() {
     let two = Two::start();
-    let broadcaster = StaticTfBroadcaster::new(&two.from).unwrap();
+    let guard = TfGuard::new(|_, _| String::new());
+    let broadcaster = StaticTfBroadcaster::new(&two.from, &guard).unwrap();
     for (child, x) in [("laser", 1.0), ("ins", 2.0), ("laser", 3.0)] {
         let mut transform = TransformStamped {
             child_frame_id: child.to_owned(),

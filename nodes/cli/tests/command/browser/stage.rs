@@ -72,7 +72,7 @@ impl Stage {
 
     fn with(cells: &[Known], live: bool) -> Self {
         let broadcaster = Arc::new(Broadcaster::new(4));
-        broadcaster.channel::<LatticeMap>("/map", Class::Map, false);
+        broadcaster.channel::<LatticeMap>("/voxel_map", Class::Map, false);
         let one = Class::Newest { depth: 1 };
         let calibration = broadcaster.channel::<CalibrationResult>("/calibration", one, true);
         let free = broadcaster.channel::<LatticeMap>("/free", one, true);

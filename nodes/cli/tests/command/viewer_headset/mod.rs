@@ -120,7 +120,7 @@ fn hostile(mut client: Client, url: &str) {
     for (id, topic, type_name) in [
         (90, "/cmd_vel", "geometry_msgs/msg/Twist"),
         (91, "/headset/mesh", "std_msgs/msg/String"),
-        (92, "/map", "lattice_msgs/msg/LatticeMap"),
+        (92, "/voxel_map", "lattice_msgs/msg/LatticeMap"),
     ] {
         let channel = json!({"id": id, "topic": topic, "encoding": "cdr", "schemaName": type_name});
         client.say(&json!({"op": "advertise", "channels": [channel]}));
