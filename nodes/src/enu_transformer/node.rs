@@ -126,9 +126,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 /// Parameter to set where another node publishes the parent of a frame of ours.
 fn remedy(options: &TransformerOptions) -> impl Fn(&TransformStamped, &str) -> String + use<> {
     let (map, base) = (options.map_frame.clone(), options.base_frame.clone());
-    move |ours, root| match ours.child_frame_id == base && root != map {
-        true => format!("odom_frame: {root} to publish {map} -> {root}, or publish_tf: false"),
-        false => "publish_tf: false".to_owned(),
+    move |ours, root| match &ours.child_frame_id {
+        child if *child == base && root != map => {
+            format!("odom_frame: {root} to publish {map} -> {root}, or publish_tf: false")
+        }
+        child if *child == map => "publish_tf: false if none below it is wanted".to_owned(),
+        _ => "publish_tf: false".to_owned(),
     }
 }
 
