@@ -108,6 +108,43 @@ impl std::fmt::Display for ScanPosesReport {
     }
 }
 
+/// Gives an odometry the transforms of a log, and `on_cloud` each cloud of a topic with its log time, up to a log time.
+pub fn feed_odometry(
+    bag: &BagReader,
+    plan: &TopicPlan,
+    topic: usize,
+    machine: &mut LidarOdometry,
+    end_ns: Option<i64>,
+    on_cloud: &mut dyn FnMut(&mut LidarOdometry, &PointCloud2, i64),
+    progress: &mut dyn FnMut(i64),
+) -> Result<(), TopicError> {
+    machine.on_tf(&plan.late_statics, true);
+    let read = ReadOptions {
+        topics: Some(plan.names(bag, |role| !matches!(role, Role::Ins(_)))),
+        end_ns,
+        ..ReadOptions::default()
+    };
+    for message in bag.messages(&read)? {
+        let message = message?;
+        match plan.roles.get(&message.topic) {
+            Some(Role::Cloud) if message.topic == topic => {
+                // What does not decode is counted when it is mapped.
+                if let Ok(cloud) = cdr::from_slice::<PointCloud2>(&message.data) {
+                    on_cloud(machine, &cloud, message.log_time_ns);
+                }
+            }
+            Some(Role::Transforms(is_static)) => {
+                if let Ok(transforms) = cdr::from_slice::<TFMessage>(&message.data) {
+                    machine.on_tf(&transforms, *is_static);
+                }
+            }
+            _ => {}
+        }
+        progress(message.log_time_ns);
+    }
+    Ok(())
+}
+
 /// Poses of the scans of a log, by the log time of their clouds.
 pub(super) struct ScanPoses {
     scans: BTreeMap<i64, ScanResult>,
@@ -132,32 +169,12 @@ impl ScanPoses {
         let name = bag.topics().get(topic).map_or("", |topic| &topic.name);
         let (odom_frame, base_frame) = (options.odom_frame.clone(), options.base_frame.clone());
         let mut machine = LidarOdometry::new(options);
-        machine.on_tf(&plan.late_statics, true);
-        let read = ReadOptions {
-            topics: Some(plan.names(bag, |role| !matches!(role, Role::Ins(_)))),
-            end_ns,
-            ..ReadOptions::default()
-        };
         let mut scans = BTreeMap::new();
-        for message in bag.messages(&read)? {
-            let message = message?;
-            match plan.roles.get(&message.topic) {
-                Some(Role::Cloud) if message.topic == topic => {
-                    // What does not decode is counted when it is mapped.
-                    if let Ok(cloud) = cdr::from_slice::<PointCloud2>(&message.data) {
-                        let result = machine.on_cloud(name, &cloud);
-                        scans.extend(result.map(|result| (message.log_time_ns, result)));
-                    }
-                }
-                Some(Role::Transforms(is_static)) => {
-                    if let Ok(transforms) = cdr::from_slice::<TFMessage>(&message.data) {
-                        machine.on_tf(&transforms, *is_static);
-                    }
-                }
-                _ => {}
-            }
-            progress(message.log_time_ns);
-        }
+        let on_cloud = &mut |machine: &mut LidarOdometry, cloud: &PointCloud2, log_time_ns| {
+            let result = machine.on_cloud(name, cloud);
+            scans.extend(result.map(|result| (log_time_ns, result)));
+        };
+        feed_odometry(bag, plan, topic, &mut machine, end_ns, on_cloud, progress)?;
         let mut in_submaps: BTreeMap<u32, u64> = BTreeMap::new();
         for scan in scans.values().filter(|scan| scan.verdict == Verdict::Ok) {
             *in_submaps.entry(scan.submap).or_default() += 1;
