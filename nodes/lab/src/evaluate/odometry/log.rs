@@ -147,15 +147,15 @@ mod tests {
     #[test]
     fn a_log_is_measured_as_the_drive_that_it_is_of() {
         let folder = tempfile::tempdir().unwrap();
-        let of = log(folder.path(), 6.0);
+        let of = log(folder.path(), 4.0);
         let (measured, report) = measure_log(&of, &mut |_| {}).unwrap();
         let mut drive = Measurement::default();
         let simulated = Drive::new(DriveScene::Indoor, 3);
-        drive.drive(&simulated, 60).unwrap();
+        drive.drive(&simulated, 40).unwrap();
         let expected = drive.finish();
         let verdicts = |t: &OdometryTrial| [t.scans, t.ok, t.weak, t.lost, t.submaps, t.refused];
         assert_eq!(verdicts(&measured), verdicts(&expected));
-        assert!(measured.ok > 40, "{measured:?}");
+        assert!(measured.ok > 20, "{measured:?}");
         // Points of the log are in single precision.
         assert!(
             (measured.ate_m - expected.ate_m).abs() < 1e-3,
@@ -168,7 +168,7 @@ mod tests {
         let text = fs::read_to_string(&of.truth).unwrap();
         let part: String = text
             .lines()
-            .skip(300)
+            .skip(250)
             .map(|line| format!("{line}\n"))
             .collect();
         let truth = folder.path().join("part.tum");
