@@ -1,15 +1,20 @@
 //! Poses in files.
 
-use std::fs::File;
+use std::fs::{File, read_to_string};
 use std::io::Read;
 use std::path::Path;
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
+use lattice_core::pose::{PoseBuffer, PoseBufferOptions, PushOutcome, StampedPose};
+use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
 
-use crate::AnyError;
+use crate::{AnyError, at};
 
 /// Most bytes of a file of 16 numbers.
 const MAX_BYTES: u64 = 1 << 16;
+/// Longest time over which poses of a trajectory are interpolated, s.
+const MAX_GAP_S: f64 = 0.25;
+/// Deviation from 1 of the norm of a quaternion that a file may have: those with three digits pass.
+const MAX_OFF_NORM: f64 = 1e-2;
 
 /// A transform from a file of 16 numbers, row by row.
 ///
@@ -39,6 +44,82 @@ fn parse_pose(text: &str) -> Option<Isometry3<f64>> {
     })
 }
 
+/// A trajectory from a TUM file: `stamp x y z qx qy qz qw` in each line, s and m; lines of `#` are comments.
+///
+/// # Errors
+/// Names the file and the line that is no pose, or not later than the one before.
+pub fn read_tum(path: &Path) -> Result<PoseBuffer, AnyError> {
+    parse_tum(&read_to_string(path).map_err(at(path))?).map_err(at(path))
+}
+
+fn parse_tum(text: &str) -> Result<PoseBuffer, String> {
+    let mut poses = PoseBuffer::new(PoseBufferOptions {
+        span_s: f64::INFINITY,
+        max_gap_s: MAX_GAP_S,
+        max_poses: usize::MAX,
+        jump_back_s: f64::INFINITY,
+    });
+    for (i, line) in text.lines().enumerate() {
+        if line.trim().is_empty() || line.trim_start().starts_with('#') {
+            continue;
+        }
+        let pose = tum_pose(line).ok_or_else(|| {
+            let expected =
+                "expected `stamp x y z qx qy qz qw`, finite, with a quaternion of norm 1";
+            format!("line {}: {line:?} is no pose; {expected}", i + 1)
+        })?;
+        if poses.push(pose) != PushOutcome::Accepted {
+            let why = "is not later than the pose before; sort the lines by time";
+            return Err(format!("line {}: {line:?} {why}", i + 1));
+        }
+    }
+    match poses.is_empty() {
+        true => Err("has no poses".to_owned()),
+        false => Ok(poses),
+    }
+}
+
+fn tum_pose(line: &str) -> Option<StampedPose> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let numbers: Option<Vec<f64>> = words.iter().map(|word| word.parse().ok()).collect();
+    let numbers: [f64; 8] = numbers?.try_into().ok()?;
+    let [_, x, y, z, i, j, k, w] = numbers;
+    let turn = Quaternion::new(w, i, j, k);
+    let is_pose = numbers.iter().all(|n| n.is_finite()) && (turn.norm() - 1.0).abs() < MAX_OFF_NORM;
+    let stamp_ns = stamp_ns(words.first()?)?;
+    is_pose.then(|| StampedPose {
+        stamp_ns,
+        map_from_base: Isometry3::from_parts(
+            Translation3::new(x, y, z),
+            UnitQuaternion::from_quaternion(turn),
+        ),
+    })
+}
+
+/// Seconds as ns: exact if they are decimal, as the digits of f64 do not last for ns since the epoch.
+fn stamp_ns(text: &str) -> Option<i64> {
+    let is_decimal = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+    let (whole, part) = text.split_once('.').unwrap_or((text, ""));
+    if !whole.is_empty() && is_decimal(whole) && is_decimal(part) {
+        let part: String = part.chars().chain("000000000".chars()).take(9).collect();
+        let whole_ns = whole.parse::<i64>().ok()?.checked_mul(1_000_000_000)?;
+        return whole_ns.checked_add(part.parse().ok()?);
+    }
+    let ns = (text.parse::<f64>().ok()? * 1e9).round();
+    (ns.abs() < i64::MAX as f64).then_some(ns as i64)
+}
+
+/// A line of a TUM file.
+pub(crate) fn tum_line(stamp_ns: i64, pose: &Isometry3<f64>) -> String {
+    let (second, ns) = (
+        stamp_ns.div_euclid(1_000_000_000),
+        stamp_ns.rem_euclid(1_000_000_000),
+    );
+    let numbers = pose.translation.vector.iter().chain(&pose.rotation.coords);
+    let numbers: String = numbers.map(|number| format!(" {number:.9}")).collect();
+    format!("{second}.{ns:09}{numbers}\n")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -63,5 +144,55 @@ mod tests {
         ] {
             assert_eq!(parse_pose(bad), None, "{bad}");
         }
+    }
+
+    #[test]
+    fn a_trajectory_is_read_as_it_was_written() {
+        let stamp_ns = 1_700_000_000_123_456_789;
+        let poses = [0, 200_000_000].map(|after_ns| {
+            let pose = Isometry3::new(
+                Vector3::new(1.0, -2.0, after_ns as f64 * 1e-8),
+                Vector3::new(0.1, -0.2, 3.0),
+            );
+            (stamp_ns + after_ns, pose)
+        });
+        let lines = poses.map(|(stamp_ns, pose)| tum_line(stamp_ns, &pose));
+        let text = format!("# a comment\n\n{}", lines.concat());
+        let read = parse_tum(&text).unwrap();
+        for (stamp_ns, pose) in &poses {
+            let apart = read.at(*stamp_ns).unwrap().to_homogeneous() - pose.to_homogeneous();
+            assert!(apart.amax() < 1e-8, "{apart}");
+        }
+        let middle = read.at(stamp_ns + 100_000_000).unwrap();
+        assert!((middle.translation.z - 1.0).abs() < 1e-8, "{middle}");
+        assert!(read.at(stamp_ns - 1).is_err());
+        // As numpy writes it.
+        let written = parse_tum("1.7e+09 0 0 0 0 0 0 -1").unwrap();
+        assert_eq!(written.newest_ns(), Some(1_700_000_000_000_000_000));
+    }
+
+    #[test]
+    fn lines_that_are_no_poses_in_order_are_named() {
+        let good = "1 0 0 0 0 0 0 1\n";
+        for (bad, why) in [
+            ("", "no poses"),
+            ("# only a comment", "no poses"),
+            ("1 0 0 0 0 0 0 1\n1.0 0 0 0 0 0 0 1", "line 2"),
+            ("1 0 0 0 0 0 0 1\n0.5 0 0 0 0 0 0 1", "not later"),
+            ("1 0 0 0 0 0 1", "line 1"),
+            ("1 0 0 0 0 0 0 1 0", "line 1"),
+            ("1 0 NaN 0 0 0 0 1", "no pose"),
+            ("1 0 inf 0 0 0 0 1", "no pose"),
+            ("NaN 0 0 0 0 0 0 1", "no pose"),
+            ("1e300 0 0 0 0 0 0 1", "no pose"),
+            ("99999999999999999999 0 0 0 0 0 0 1", "no pose"),
+            ("1 0 0 0 0 0 0 0", "norm 1"),
+            ("1 0 0 0 2 0 0 0", "norm 1"),
+            ("stamp x y z qx qy qz qw", "line 1"),
+        ] {
+            let error = parse_tum(bad).unwrap_err();
+            assert!(error.contains(why), "{bad}: {error}");
+        }
+        assert!(parse_tum(good).is_ok());
     }
 }

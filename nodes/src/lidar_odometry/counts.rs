@@ -42,6 +42,11 @@ pub struct OdometryCounts {
 }
 
 impl OdometryCounts {
+    /// Clouds without a pose.
+    pub fn clouds_refused(&self) -> u64 {
+        self.clouds_malformed + self.clouds_no_mount + self.clouds_out_of_order
+    }
+
     /// Poses that are predictions, for whichever reason.
     pub fn scans_lost(&self) -> u64 {
         self.lost_few_points + self.lost_no_overlap + self.lost_unobservable + self.lost_one_place

@@ -143,11 +143,14 @@ impl Shell {
     fn on(&mut self, event: Event) {
         match event {
             Event::Cloud(cloud) => {
-                let (refused, found) = (self.refused(), self.machine.on_cloud(POINTS, &cloud, 0));
+                let (refused, found) = (
+                    self.machine.counts().clouds_refused(),
+                    self.machine.on_cloud(POINTS, &cloud, 0),
+                );
                 found
                     .into_iter()
                     .for_each(|found| self.publish(&found.result));
-                if self.refused() > refused {
+                if self.machine.counts().clouds_refused() > refused {
                     self.diagnose(None);
                 }
             }
@@ -166,12 +169,6 @@ impl Shell {
             Event::Transforms(message, is_static) => self.machine.on_tf(&message, is_static),
             Event::Finish => self.finish(),
         }
-    }
-
-    /// Clouds that gave no pose.
-    fn refused(&self) -> u64 {
-        let counts = self.machine.counts();
-        counts.clouds_malformed + counts.clouds_no_mount + counts.clouds_out_of_order
     }
 
     fn publish(&mut self, result: &ScanResult) {

@@ -13,7 +13,7 @@ mod topics;
 
 pub use plan::{TopicPlan, TopicWishes, plan};
 pub use report::{LatticeReport, RunReport};
-pub use scan_poses::ScanPosesReport;
+pub use scan_poses::{OdometryInput, ScanPosesReport, feed_odometry};
 pub use topics::{Role, TopicError};
 
 use std::sync::Arc;

@@ -27,6 +27,8 @@ pub struct TopicWishes {
     pub map_frame: Option<String>,
     /// Frame of the machine.
     pub base_frame: Option<String>,
+    /// True to take poses of lidar odometry, whichever the log has.
+    pub lidar_odometry: bool,
 }
 
 /// Roles by topic of the log, the source of poses, and the frames.

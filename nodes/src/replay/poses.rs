@@ -88,6 +88,9 @@ impl Log<'_> {
 
     /// The poses to take: of the source that is wished, or of the first whose frames transforms connect.
     pub fn poses(&mut self) -> Result<Poses, TopicError> {
+        if self.wishes.lidar_odometry {
+            return self.of_scans();
+        }
         if let Some(source) = self.wishes.source {
             let found = self.of_source(source)?;
             return found.map(|(poses, _)| poses).ok_or_else(|| {

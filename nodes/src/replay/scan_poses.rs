@@ -110,6 +110,78 @@ impl std::fmt::Display for ScanPosesReport {
     }
 }
 
+/// An input of lidar odometry from a log.
+pub enum OdometryInput<'a> {
+    /// A cloud of a topic, with its log time.
+    Cloud(&'a str, &'a PointCloud2, i64),
+    /// A sample of a gyroscope, of a topic.
+    Imu(&'a str, &'a Imu),
+    /// The end of the log.
+    End,
+}
+
+impl OdometryInput<'_> {
+    /// Gives the input to an odometry; the tags of poses are log times of clouds.
+    pub fn give(&self, machine: &mut LidarOdometry) -> Vec<Registered> {
+        match self {
+            Self::Cloud(topic, cloud, log_time_ns) => machine.on_cloud(topic, cloud, *log_time_ns),
+            Self::Imu(topic, imu) => machine.on_imu(topic, imu).into_iter().collect(),
+            Self::End => machine.finish().into_iter().collect(),
+        }
+    }
+}
+
+/// Gives an odometry the transforms of a log, and `on_input` the clouds of a topic and the samples of the gyroscope, up to
+/// a log time.
+pub fn feed_odometry(
+    bag: &BagReader,
+    plan: &TopicPlan,
+    topic: usize,
+    machine: &mut LidarOdometry,
+    end_ns: Option<i64>,
+    on_input: &mut dyn FnMut(&mut LidarOdometry, OdometryInput),
+    progress: &mut dyn FnMut(i64),
+) -> Result<(), TopicError> {
+    machine.on_tf(&plan.late_statics, true);
+    let name = |topic: usize| {
+        let topic = bag.topics().get(topic);
+        topic.map_or("", |topic| topic.name.as_str())
+    };
+    let mut topics = plan.names(bag, |role| !matches!(role, Role::Ins(_)));
+    topics.extend(plan.imu.map(|imu| name(imu).to_owned()));
+    let read = ReadOptions {
+        topics: Some(topics),
+        end_ns,
+        ..ReadOptions::default()
+    };
+    for message in bag.messages(&read)? {
+        let message = message?;
+        match plan.roles.get(&message.topic) {
+            Some(Role::Cloud) if message.topic == topic => {
+                // What does not decode is counted when it is mapped.
+                if let Ok(cloud) = cdr::from_slice::<PointCloud2>(&message.data) {
+                    let input = OdometryInput::Cloud(name(topic), &cloud, message.log_time_ns);
+                    on_input(machine, input);
+                }
+            }
+            Some(Role::Transforms(is_static)) => {
+                if let Ok(transforms) = cdr::from_slice::<TFMessage>(&message.data) {
+                    machine.on_tf(&transforms, *is_static);
+                }
+            }
+            _ if Some(message.topic) == plan.imu => {
+                if let Ok(imu) = cdr::from_slice::<Imu>(&message.data) {
+                    on_input(machine, OdometryInput::Imu(name(message.topic), &imu));
+                }
+            }
+            _ => {}
+        }
+        progress(message.log_time_ns);
+    }
+    on_input(machine, OdometryInput::End);
+    Ok(())
+}
+
 /// Poses of the scans of a log, by the log time of their clouds.
 pub(super) struct ScanPoses {
     scans: BTreeMap<i64, ScanResult>,
@@ -134,44 +206,14 @@ impl ScanPoses {
         let name = bag.topics().get(topic).map_or("", |topic| &topic.name);
         let (odom_frame, base_frame) = (options.odom_frame.clone(), options.base_frame.clone());
         let mut machine = LidarOdometry::new(options);
-        machine.on_tf(&plan.late_statics, true);
         let imu_name = plan.imu.and_then(|topic| bag.topics().get(topic));
         let imu_name = imu_name.map_or("", |topic| &topic.name);
-        let mut topics = plan.names(bag, |role| !matches!(role, Role::Ins(_)));
-        topics.extend(plan.imu.map(|_| imu_name.to_owned()));
-        let read = ReadOptions {
-            topics: Some(topics),
-            end_ns,
-            ..ReadOptions::default()
-        };
         let mut scans = BTreeMap::new();
-        let mut keep = |found: Vec<Registered>| {
-            scans.extend(found.into_iter().map(|found| (found.tag, found.result)));
+        let on_input = &mut |machine: &mut LidarOdometry, input: OdometryInput| {
+            let found = input.give(machine).into_iter();
+            scans.extend(found.map(|found| (found.tag, found.result)));
         };
-        for message in bag.messages(&read)? {
-            let message = message?;
-            match plan.roles.get(&message.topic) {
-                Some(Role::Cloud) if message.topic == topic => {
-                    // What does not decode is counted when it is mapped.
-                    if let Ok(cloud) = cdr::from_slice::<PointCloud2>(&message.data) {
-                        keep(machine.on_cloud(name, &cloud, message.log_time_ns));
-                    }
-                }
-                Some(Role::Transforms(is_static)) => {
-                    if let Ok(transforms) = cdr::from_slice::<TFMessage>(&message.data) {
-                        machine.on_tf(&transforms, *is_static);
-                    }
-                }
-                _ if Some(message.topic) == plan.imu => {
-                    if let Ok(imu) = cdr::from_slice::<Imu>(&message.data) {
-                        keep(machine.on_imu(imu_name, &imu).into_iter().collect());
-                    }
-                }
-                _ => {}
-            }
-            progress(message.log_time_ns);
-        }
-        keep(machine.finish().into_iter().collect());
+        feed_odometry(bag, plan, topic, &mut machine, end_ns, on_input, progress)?;
         let mut in_submaps: BTreeMap<u32, u64> = BTreeMap::new();
         for scan in scans.values().filter(|scan| scan.verdict == Verdict::Ok) {
             *in_submaps.entry(scan.submap).or_default() += 1;

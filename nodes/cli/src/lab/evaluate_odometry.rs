@@ -4,7 +4,7 @@ use super::{Choice, choice, processors};
 use crate::CliResult;
 use crate::progress::Progress;
 use clap::Args;
-use lattice_lab::evaluate::{odometry_report, run_odometry};
+use lattice_lab::evaluate::{OdometryLog, measure_log, odometry_report, run_odometry};
 use lattice_lab::simulate::drive::DriveScene;
 use lattice_lab::{markdown, write_report};
 use std::path::PathBuf;
@@ -13,15 +13,25 @@ use std::path::PathBuf;
 #[derive(Args)]
 pub struct OfDrives {
     /// Folder of the results and the report; a run that was ended is continued
-    #[arg(long)]
-    out: PathBuf,
+    #[arg(long, required_unless_present = "log", conflicts_with = "log")]
+    out: Option<PathBuf>,
     /// Drives of each scene
-    #[arg(long, default_value_t = 5)]
+    #[arg(long, default_value_t = 5, conflicts_with = "log")]
     seeds: u64,
     /// Scenes
-    #[arg(long, value_delimiter = ',', value_parser = choice(&SCENES),
+    #[arg(long, value_delimiter = ',', value_parser = choice(&SCENES), conflicts_with = "log",
         default_value = "town,indoor,corridor,tunnel,yard,blank,gap")]
     scenes: Vec<DriveScene>,
+    /// Log (rosbag2) to measure instead; its scans are registered as by `lattice replay`, whichever poses it has
+    #[arg(long, value_name = "LOG", requires = "truth")]
+    log: Option<PathBuf>,
+    /// True poses, `stamp x y z qx qy qz qw` in each line, of `base_link` where transforms connect it with the clouds,
+    /// else of their frame; interpolated over 0.25 s at most
+    #[arg(long, value_name = "TUM", requires = "log")]
+    truth: Option<PathBuf>,
+    /// Topic of the clouds; by default that with the most clouds
+    #[arg(long, value_name = "TOPIC", requires = "log")]
+    points: Option<String>,
     /// Threads [default: as many as processors]
     #[arg(long)]
     threads: Option<usize>,
@@ -30,8 +40,8 @@ pub struct OfDrives {
     json: bool,
 }
 
-/// Values of `--scenes`.
-const SCENES: [Choice<DriveScene>; 7] = [
+/// Scenes of drives.
+pub const SCENES: [Choice<DriveScene>; 7] = [
     ("town", "A circuit of streets", DriveScene::Town),
     ("indoor", "A circuit in a hall", DriveScene::Indoor),
     ("corridor", "A corridor with doors", DriveScene::Corridor),
@@ -48,15 +58,29 @@ const SCENES: [Choice<DriveScene>; 7] = [
 impl OfDrives {
     /// Runs the command.
     pub fn run(self) -> CliResult {
-        let threads = self.threads.unwrap_or_else(processors);
+        let pool = lattice_lab::pool(self.threads.unwrap_or_else(processors))?;
         let bar = Progress::new("odometry");
-        let trials = lattice_lab::pool(threads)?.install(|| {
-            let told = &mut |done: usize, all: usize| bar.set(done as f64 / all.max(1) as f64);
-            run_odometry(&self.out, &self.scenes, self.seeds, told)
-        })?;
+        let (trials, report) = match (self.log, self.truth, self.out) {
+            (Some(log), Some(truth), _) => {
+                let points = self.points;
+                let of = OdometryLog { log, truth, points };
+                let (trial, report) =
+                    pool.install(|| measure_log(&of, &mut |done| bar.set(done)))?;
+                (vec![trial], report)
+            }
+            (_, _, Some(out)) => {
+                let trials = pool.install(|| {
+                    let told =
+                        &mut |done: usize, all: usize| bar.set(done as f64 / all.max(1) as f64);
+                    run_odometry(&out, &self.scenes, self.seeds, told)
+                })?;
+                let report = odometry_report(&trials);
+                write_report(&report, &out)?;
+                (trials, report)
+            }
+            _ => return Err("--out FOLDER, or --log LOG with --truth TUM, is missing".into()),
+        };
         bar.done();
-        let report = odometry_report(&trials);
-        write_report(&report, &self.out)?;
         match self.json {
             true => println!("{}", serde_json::to_string_pretty(&trials)?),
             false => print!("{}", markdown(&report)),

@@ -1,5 +1,6 @@
 //! `lattice simulate`: logs and point files of simulated machines.
 
+mod drive;
 mod house;
 mod images;
 mod town;
@@ -29,6 +30,8 @@ pub enum Simulate {
     Images(images::Images),
     /// A street of a town as two lidar scans see it at different times, and the truth
     Town(town::Town),
+    /// The log of a lidar that moves through a scene, without poses, and the truth: to try odometry
+    Drive(drive::Drive),
 }
 
 /// Values of `--storage`.
@@ -111,6 +114,7 @@ impl Simulate {
             Self::House(command) => command.run(),
             Self::Images(command) => command.run(),
             Self::Town(command) => command.run(),
+            Self::Drive(command) => command.run(),
         }
     }
 }

@@ -289,6 +289,7 @@ impl Replay {
             ins,
             map_frame: frame("map_frame")?,
             base_frame: frame("base_frame")?,
+            ..TopicWishes::default()
         })
     }
 }

@@ -19,8 +19,7 @@ mod site;
 mod transport;
 
 pub use camera::{CameraReport, CameraSetup, camera};
-use clock::Spent;
-pub(crate) use clock::timed;
+pub(crate) use clock::{Spent, timed};
 pub use file::{FileMethod, file};
 pub use insert::{Store, insert};
 pub use neighbors::{NeighborMethod, neighbors};

@@ -22,8 +22,10 @@
 //!
 //! [`write_house`] writes another world: a furnished house as a robot maps it and as a headset sees
 //! four of its corners (see [`crate::simulate::house`]), for calibrations; [`write_images`] what cameras see of such
-//! houses, for networks.
+//! houses, for networks. [`write_drive`] writes the scans of a lidar that moves (see [`crate::simulate::drive`]), for
+//! odometry.
 
+mod drive;
 mod facts;
 mod house;
 mod images;
@@ -34,6 +36,7 @@ mod town;
 mod truth;
 mod write;
 
+pub use drive::{DriveLogOptions, DriveLogSummary, TRUTH_FILE, write_drive};
 pub use facts::{
     BASE_FRAME, BOBCAT_GPS_WEEK, BOBCAT_GPS_WEEK_MS, BOBCAT_LEAP_SECONDS, BOBCAT_ORIGIN,
     BOBCAT_UNDULATION_M, IMU_FRAME, INSPVAX_TOPIC, MAP_FRAME, ODOMETRY_TOPIC, TF_STATIC_TOPIC,

@@ -36,7 +36,7 @@ pub use house::read_house;
 pub use many::{Case, run_cases, settings_of};
 pub use methods::competitors;
 pub(crate) use methods::{color, letters, title};
-pub use odometry::{OdometryTrial, odometry_report, run_odometry};
+pub use odometry::{OdometryLog, OdometryTrial, measure_log, odometry_report, run_odometry};
 pub use reliability::reliability_report;
 pub use report::report;
 pub use results::Results;

@@ -170,6 +170,12 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     ("docs/octomap.md", "lattice quantize map.bt", Runs("")),
     ("docs/odometry.md", "lattice replay LOG", Runs("--direct")),
     ("docs/odometry.md", "lattice run", Works("lidar_odometry")),
+    (
+        "docs/odometry.md",
+        "lattice simulate drive",
+        Runs("--duration 3"),
+    ),
+    ("docs/odometry.md", "lattice evaluate odometry", Runs("")),
     ("docs/odd_logs.md", "lattice replay LOG --direct", Runs("")),
     ("docs/poses.md", "lattice bag info LOG", Runs("")),
     ("docs/poses.md", "lattice replay LOG --direct", Runs("")),

@@ -1,15 +1,19 @@
-//! Odometry of a lidar measured in simulated drives: drift, verdicts, and covariances against the truth.
+//! Odometry of a lidar measured in simulated drives and logs: drift, verdicts, and covariances against the truth.
 
-use std::collections::BTreeMap;
+mod log;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::time::Instant;
 
 use lattice_core::odometry::{Odometry, OdometryOptions, Prior, Scan, ScanResult, Verdict};
 use lattice_nodes::files::atomic_write::write_text;
 use nalgebra::{Isometry3, Vector6};
 use serde::{Deserialize, Serialize};
 
+pub use log::{OdometryLog, measure_log};
+
 use super::median;
+use crate::bench::{Spent, timed};
 use crate::report::{Cell, Report, Section, Table};
 use crate::simulate::drive::{Drive, DriveScene};
 use crate::{AnyError, at};
@@ -24,9 +28,9 @@ const WRONG_M: f64 = 1.0;
 /// One drive.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct OdometryTrial {
-    /// Name of the scene.
+    /// Name of the scene, or of the log.
     pub scene: String,
-    /// Seed of the scene.
+    /// Seed of the scene; 0 of a log.
     pub seed: u64,
     /// Scans, and those of each verdict.
     pub scans: u64,
@@ -36,6 +40,12 @@ pub struct OdometryTrial {
     pub weak: u64,
     /// Poses predicted.
     pub lost: u64,
+    /// Clouds refused, without a pose.
+    #[serde(default)]
+    pub refused: u64,
+    /// Poses that are `OK` at times without a truth: they are not measured.
+    #[serde(default)]
+    pub without_truth: u64,
     /// Submaps begun.
     pub submaps: u64,
     /// Root mean square of the errors of poses that are `OK`, since the beginnings of their submaps, m.
@@ -52,6 +62,9 @@ pub struct OdometryTrial {
     pub nees: Option<f64>,
     /// Mean wall time of a scan on the threads of the run, ms.
     pub ms: f64,
+    /// Mean processor time of a scan, ms.
+    #[serde(default)]
+    pub cpu_ms: f64,
 }
 
 /// A pose with its truth, both since the beginning of the submap.
@@ -61,53 +74,91 @@ struct Posed {
     truth: Isometry3<f64>,
 }
 
+/// Poses of a run against the truth, scan by scan.
+#[derive(Default)]
+struct Measurement {
+    trial: OdometryTrial,
+    spent_s: [f64; 2],
+    submaps: BTreeSet<u32>,
+    /// First poses of the submaps, found and true.
+    begun: BTreeMap<u32, (Isometry3<f64>, Isometry3<f64>)>,
+    posed: Vec<Posed>,
+}
+
+impl Measurement {
+    /// Adds the time of a registration.
+    fn spend(&mut self, spent: Spent) {
+        self.spent_s[0] += spent.wall_s;
+        self.spent_s[1] += spent.cpu_s;
+    }
+
+    /// Adds a scan: its pose with the truth at that time, or none if it was refused.
+    fn add(&mut self, posed: Option<(ScanResult, Option<Isometry3<f64>>)>) {
+        let trial = &mut self.trial;
+        trial.scans += 1;
+        let Some((result, truth)) = posed else {
+            trial.refused += 1;
+            return;
+        };
+        match result.verdict {
+            Verdict::Ok => trial.ok += 1,
+            Verdict::Weak(_) => trial.weak += 1,
+            Verdict::Lost(_) => trial.lost += 1,
+        }
+        if result.verdict != Verdict::Ok {
+            return;
+        }
+        self.submaps.insert(result.submap);
+        let Some(truth) = truth else {
+            trial.without_truth += 1;
+            return;
+        };
+        let first = (result.odom_from_base, truth);
+        let (odom_first, true_first) = self.begun.entry(result.submap).or_insert(first);
+        self.posed.push(Posed {
+            found: odom_first.inverse() * result.odom_from_base,
+            truth: true_first.inverse() * truth,
+            // In the axes of the first scan, as the poses are.
+            result: turned(result, odom_first),
+        });
+    }
+
+    /// Registers so many scans of a drive.
+    fn drive(&mut self, drive: &Drive, scans: usize) -> Result<(), AnyError> {
+        let mut odometry = Odometry::new(OdometryOptions::default());
+        for number in drive.scans().take(scans) {
+            let scan = drive.scan(number);
+            let input = Scan {
+                points_m: &scan.points_m,
+                times_ns: Some(&scan.times_ns),
+                stamp_ns: scan.end_ns,
+            };
+            let (result, spent) = timed(|| odometry.register(&input, &Prior::default()));
+            self.spend(spent);
+            self.add(Some((result?, Some(drive.pose(scan.end_ns)))));
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> OdometryTrial {
+        let scans = self.trial.scans.max(1) as f64;
+        [self.trial.ms, self.trial.cpu_ms] = self.spent_s.map(|all_s| 1e3 * all_s / scans);
+        self.trial.submaps = self.submaps.len() as u64;
+        self.trial.measure(&self.posed);
+        self.trial
+    }
+}
+
 impl OdometryTrial {
     /// Drives through a scene.
     pub fn run(scene: DriveScene, seed: u64) -> Result<OdometryTrial, AnyError> {
-        let drive = Drive::new(scene, seed);
-        let mut odometry = Odometry::new(OdometryOptions::default());
-        let mut trial = OdometryTrial {
+        let mut measurement = Measurement::default();
+        measurement.drive(&Drive::new(scene, seed), usize::MAX)?;
+        Ok(OdometryTrial {
             scene: scene.name().to_owned(),
             seed,
-            ..OdometryTrial::default()
-        };
-        let mut begun: BTreeMap<u32, (Isometry3<f64>, Isometry3<f64>)> = BTreeMap::new();
-        let mut posed: Vec<Posed> = Vec::new();
-        for number in drive.scans() {
-            let scan = drive.scan(number);
-            let begin = Instant::now();
-            let result = odometry.register(
-                &Scan {
-                    points_m: &scan.points_m,
-                    times_ns: Some(&scan.times_ns),
-                    stamp_ns: scan.end_ns,
-                },
-                &Prior::default(),
-            )?;
-            trial.ms += begin.elapsed().as_secs_f64() * 1e3;
-            trial.scans += 1;
-            match result.verdict {
-                Verdict::Ok => trial.ok += 1,
-                Verdict::Weak(_) => trial.weak += 1,
-                Verdict::Lost(_) => trial.lost += 1,
-            }
-            if result.verdict != Verdict::Ok {
-                continue;
-            }
-            let truth = drive.pose(scan.end_ns);
-            let first = (result.odom_from_base, truth);
-            let (odom_first, true_first) = begun.entry(result.submap).or_insert(first);
-            posed.push(Posed {
-                found: odom_first.inverse() * result.odom_from_base,
-                truth: true_first.inverse() * truth,
-                // In the axes of the first scan, as the poses are.
-                result: turned(result, odom_first),
-            });
-        }
-        trial.ms /= trial.scans.max(1) as f64;
-        trial.submaps = begun.len() as u64;
-        trial.measure(&posed);
-        Ok(trial)
+            ..measurement.finish()
+        })
     }
 
     fn measure(&mut self, posed: &[Posed]) {
@@ -212,15 +263,19 @@ pub fn run_odometry(
 
 /// A table with one line for each scene.
 pub fn odometry_report(trials: &[OdometryTrial]) -> Report {
+    report_of("Simulated drives with motion during each scan.", trials)
+}
+
+fn report_of(lead: &str, trials: &[OdometryTrial]) -> Report {
     let mut scenes: BTreeMap<&str, Vec<&OdometryTrial>> = BTreeMap::new();
     for trial in trials {
         scenes.entry(&trial.scene).or_default().push(trial);
     }
     let rows = scenes.iter().map(|(scene, trials)| line(scene, trials));
     let columns = "scene|seeds|OK, %|WEAK, %|LOST, %|median ATE, m|largest error, m|median RPE, %|\
-        wrong OK|OK beyond 3 sigma, %|median NEES|median time of a scan, ms";
+        wrong OK|OK beyond 3 sigma, %|median NEES|median time of a scan, ms|median processor time, ms";
     let lead = format!(
-        "Simulated drives with motion during each scan. Errors are those of poses that are OK, since the beginnings of \
+        "{lead} Errors are those of poses that are OK, since the beginnings of \
          their submaps; RPE over {SEGMENT_M} m; a pose that is OK and off by more than {WRONG_M} m is wrong."
     );
     let section = Section {
@@ -255,9 +310,10 @@ fn line(scene: &str, trials: &[&OdometryTrial]) -> Vec<Cell> {
         format!("{largest_m:.3}").into(),
         middle(|t| t.rpe_percent, 2).into(),
         (sum(|t| t.wrong) as usize).into(),
-        part(sum(|t| t.beyond_3_sigma), sum(|t| t.ok)).into(),
+        part(sum(|t| t.beyond_3_sigma), sum(|t| t.ok - t.without_truth)).into(),
         middle(|t| t.nees, 1).into(),
         middle(|t| Some(t.ms), 0).into(),
+        middle(|t| Some(t.cpu_ms), 0).into(),
     ]
 }
 
