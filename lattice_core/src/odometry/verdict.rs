@@ -56,7 +56,7 @@ pub enum LostCause {
     FewPoints,
     /// The map does not explain the scan.
     NoOverlap,
-    /// Motion along a weak direction is not known to [`MAX_WEAK_M`].
+    /// Motion along a weak direction is not known to `MAX_WEAK_M`.
     Unobservable,
     /// The map was seen from one place only: points of the same beams agree there whatever the motion is.
     OnePlace,
