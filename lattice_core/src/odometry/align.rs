@@ -28,7 +28,7 @@ struct Equations {
     weight: f64,
 }
 
-/// What planes show of motions (translation, rotation about the base, axes of the map): sums over points on planes.
+/// Motions that planes show (translation, rotation about the base, axes of the map): sums over points on planes.
 #[derive(Clone, Debug)]
 pub(super) struct Geometry {
     /// Squared displacement along normals, less what the uncertainty of normals adds.

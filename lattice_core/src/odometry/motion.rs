@@ -16,7 +16,7 @@ const NEWEST: f64 = 0.05;
 /// Error of a motion that wheels give, as a part of its length.
 const WHEEL_ERROR: f64 = 0.05;
 
-/// What is known of the motion since the scan before.
+/// Measured motion since the scan before.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Prior<'a> {
     /// Motion of the base from the end of the scan before to the end of this one, as of wheels: `before_from_now`.

@@ -28,7 +28,7 @@ pub(super) struct Plane {
     pub tilt: Matrix3<f64>,
 }
 
-/// What a cell says of points near it.
+/// Surface of a cell, for points near it.
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
     /// Centroid, metres.

@@ -73,7 +73,7 @@ impl fmt::Display for LostCause {
     }
 }
 
-/// What the verdict follows from.
+/// Evidence for a verdict.
 pub(super) struct Evidence {
     pub points: usize,
     pub overlap: f64,
