@@ -22,7 +22,7 @@ pub struct OfDrives {
     #[arg(long, value_delimiter = ',', value_parser = choice(&SCENES), conflicts_with = "log",
         default_value = "town,indoor,corridor,tunnel,yard,blank,gap")]
     scenes: Vec<DriveScene>,
-    /// rosbag2 log to register the scans of instead, as `lattice replay` does for a log without poses
+    /// Log (rosbag2) to measure instead; its scans are registered as by `lattice replay`, whichever poses it has
     #[arg(long, value_name = "LOG", requires = "truth")]
     log: Option<PathBuf>,
     /// True poses, `stamp x y z qx qy qz qw` in each line, of `base_link` where transforms connect it with the clouds,
