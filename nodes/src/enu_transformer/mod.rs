@@ -156,6 +156,7 @@ impl EnuTransformer {
     }
 
     /// The options.
+    #[cfg(feature = "bags")]
     pub(crate) fn options(&self) -> &TransformerOptions {
         &self.options
     }
