@@ -304,7 +304,7 @@ pub fn run(
         let part = log_time_ns.saturating_sub(start_ns) as f64 / span_ns;
         progress(from + (to - from) * part.clamp(0.0, 1.0));
     };
-    let odometry = match plan.odometry {
+    let mut odometry = match plan.odometry {
         Some(topic) => {
             let options = LidarOdometryOptions::of(pipeline.transformer.options());
             let end_ns = (!whole).then_some(to_ns);
@@ -325,7 +325,7 @@ pub fn run(
                 let topic = bag.topics().get(message.topic);
                 let topic = topic.map_or("", |topic| topic.name.as_str());
                 let of_scans = odometry
-                    .as_ref()
+                    .as_mut()
                     .filter(|scans| scans.topic == message.topic);
                 if let Some(scans) = of_scans {
                     let Some(poses) = scans.poses(message.log_time_ns) else {

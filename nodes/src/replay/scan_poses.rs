@@ -189,6 +189,8 @@ pub(super) struct ScanPoses {
     base_frame: String,
     /// The submap with the most scans that are `OK`.
     mapped: u32,
+    /// Time of the newest pose given.
+    given_ns: Option<i64>,
     pub topic: usize,
     pub report: ScanPosesReport,
 }
@@ -234,12 +236,13 @@ impl ScanPoses {
             odom_frame,
             base_frame,
             mapped,
+            given_ns: None,
             topic,
         })
     }
 
     /// Poses that cover the cloud of a log time; `None` if it is not to be mapped.
-    pub fn poses(&self, log_time_ns: i64) -> Option<Vec<Odometry>> {
+    pub fn poses(&mut self, log_time_ns: i64) -> Option<Vec<Odometry>> {
         let is_mapped =
             |scan: &&ScanResult| scan.verdict == Verdict::Ok && scan.submap == self.mapped;
         let scan = self.scans.get(&log_time_ns).filter(is_mapped)?;
@@ -249,10 +252,13 @@ impl ScanPoses {
             |before: &&ScanResult| scan.first_ns.saturating_sub(before.end_ns) <= PAUSE_NS;
         let mut poses = vec![self.message(scan)];
         if let Some(before) = before.filter(follows) {
-            poses.insert(0, self.message(before));
+            if self.given_ns != Some(before.end_ns) {
+                poses.insert(0, self.message(before));
+            }
         } else if scan.first_ns < scan.end_ns {
             poses.insert(0, self.message(&scan.at_first()));
         }
+        self.given_ns = Some(scan.end_ns);
         Some(poses)
     }
 

@@ -263,6 +263,7 @@ fn a_replay_maps_one_submap_and_counts_the_scans_of_others() {
     assert!(mapped > 15 && elsewhere > 15, "{odometry:?}");
     assert_eq!(odometry.counts.submaps, 2);
     assert_eq!(report.transformer.counts.clouds_out, mapped);
+    assert_eq!(report.transformer.counts.poses_out_of_order, 0);
     let said = report.to_string();
     assert!(
         said.contains("in submaps whose place in the map is unknown"),
