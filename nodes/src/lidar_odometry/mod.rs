@@ -142,12 +142,11 @@ impl LidarOdometry {
     /// one. Clouds without a pose are counted by reason. `tag` returns with the pose.
     pub fn on_cloud(&mut self, topic: &str, message: &PointCloud2, tag: i64) -> Vec<Registered> {
         self.counts.clouds_in += 1;
+        let mut found: Vec<Registered> = self.finish().into_iter().collect();
         match self.read(topic, message, tag) {
             Ok(scan) => {
-                let before = self.finish();
                 self.waiting = Some(scan);
-                let now = self.register_if_complete();
-                before.into_iter().chain(now).collect()
+                found.extend(self.register_if_complete());
             }
             Err((reason, text)) => {
                 match reason {
@@ -156,9 +155,9 @@ impl LidarOdometry {
                     _ => self.counts.clouds_malformed += 1,
                 }
                 self.refusals.add(topic, reason, || text);
-                Vec::new()
             }
         }
+        found
     }
 
     /// The pose of the scan that waits, without further samples of other sensors.
@@ -215,14 +214,12 @@ impl LidarOdometry {
         let max_points = options.max_cloud_points;
         let times = CloudTimes::read(topic, message, max_points, time, &mut self.notes)
             .map_err(|error| malformed(&error))?;
-        let waiting_ns = self.waiting.as_ref().map(|scan| scan.scan().span_ns().1);
-        let last_ns = waiting_ns.or(self.last.as_ref().map(|last| last.end_ns));
-        if let Some(last_ns) = last_ns
+        if let Some(last_ns) = self.last.as_ref().map(|last| last.end_ns)
             && times.last_ns <= last_ns
         {
             if last_ns.saturating_sub(times.last_ns) > CLOCK_JUMP_NS {
                 // A log that loops: another drive.
-                (self.waiting, self.last) = (None, None);
+                (self.last, self.certain_ns) = (None, None);
                 self.core = Core::new(OdometryOptions {
                     lattice: options.lattice,
                 });
