@@ -13,6 +13,7 @@
 //! | register clouds | [`registration::register`] (feature `registration`) |
 //! | find a cloud in a map without a guess | [`registration::register_global`] (feature `registration`) |
 //! | follow a lidar by its scans | [`odometry::Odometry`] (feature `registration`) |
+//! | correct its poses where it comes back to a place | [`loop_closure::LoopCloser`] (feature `registration`) |
 //!
 //! Both features are defaults. Programs are in `examples/`, from `1_quantize_a_scan` to `4_odometry_of_scans`. Vectors
 //! and poses are those of [`nalgebra`], which is re-exported.
@@ -31,6 +32,8 @@ pub mod cloud;
 pub mod geodesy;
 mod kd_tree;
 pub mod lattice;
+#[cfg(feature = "registration")]
+pub mod loop_closure;
 #[cfg(feature = "registration")]
 pub mod odometry;
 pub mod pose;

@@ -91,6 +91,8 @@ pub struct ScanResult {
     /// Covariance of a perturbation (translation, rotation) in the axes of `odom` about the base since the beginning of
     /// the submap, m^2, m rad and rad^2.
     pub covariance: Matrix6<f64>,
+    /// The part of it that grows along the path: the covariance of the place of the map around the base.
+    pub drift: Matrix6<f64>,
     /// Verdict.
     pub verdict: Verdict,
     /// Number of the submap, from 0. Poses of two submaps are not known to each other.
@@ -120,6 +122,7 @@ impl ScanResult {
 pub struct Odometry {
     options: OdometryOptions,
     submap: Option<Submap>,
+    centroids_m: Vec<Vector3<f64>>,
 }
 
 impl Odometry {
@@ -128,6 +131,7 @@ impl Odometry {
         Odometry {
             options,
             submap: None,
+            centroids_m: Vec::new(),
         }
     }
 
@@ -194,6 +198,7 @@ impl Odometry {
             weak_m,
         });
         let result = submap.follow((first_ns, end_ns), &sample, &alignment, &guess, verdict);
+        self.centroids_m = sample.centroids_m;
         Ok(ScanResult { contrast, ..result })
     }
 
@@ -221,6 +226,7 @@ impl Odometry {
             end_ns,
             odom_from_base,
             covariance: Matrix6::zeros(),
+            drift: Matrix6::zeros(),
             verdict: Verdict::Lost(LostCause::FewPoints),
             submap: number,
             overlap: 0.0,
@@ -233,6 +239,7 @@ impl Odometry {
         let mut submap = Submap::new(number, scan, sizes, kind, odom_from_base)?;
         submap.grow(&sample);
         self.submap = Some(submap);
+        self.centroids_m = sample.centroids_m;
         result.verdict = Verdict::Lost(LostCause::OnePlace);
         (result.overlap, result.contrast) = (1.0, f64::INFINITY);
         Ok(result)
@@ -241,6 +248,11 @@ impl Odometry {
     /// The map of the scans before.
     pub fn map(&self) -> Option<&MomentMap> {
         self.submap.as_ref().map(|submap| &submap.map)
+    }
+
+    /// Centroids of the cells of the last scan, deskewed, metres in the frame of the base at the end of the scan.
+    pub fn centroids_m(&self) -> &[Vector3<f64>] {
+        &self.centroids_m
     }
 
     /// Sizes of cells in use.

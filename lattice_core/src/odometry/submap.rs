@@ -273,6 +273,7 @@ impl Submap {
             end_ns,
             odom_from_base: self.odom_from_base,
             covariance: self.covariance + registration,
+            drift: self.covariance,
             verdict,
             submap: self.number,
             overlap: alignment.overlap,

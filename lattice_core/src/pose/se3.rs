@@ -3,7 +3,7 @@
 //! A twist is (rho, phi): translation (m) first, then rotation (rad). exp(rho, phi) has the rotation
 //! exp(phi) and the translation V(phi) rho (Barfoot, State Estimation for Robotics, eqs. 7.79 to 7.85).
 
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6};
 
 /// Angle below which the coefficients are evaluated as series, radians.
 const SERIES_RAD: f64 = 0.1;
@@ -48,6 +48,17 @@ pub fn log(transform: &Isometry3<f64>) -> Vector6<f64> {
     let across = phi.cross(&t);
     let rho = t - 0.5 * across + c * phi.cross(&across);
     Vector6::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
+}
+
+/// Adjoint: takes a twist (rho, phi) of the source frame into the target frame (Barfoot, eq. 7.45).
+pub fn adjoint(transform: &Isometry3<f64>) -> Matrix6<f64> {
+    let rotation = *transform.rotation.to_rotation_matrix().matrix();
+    let mut adjoint = Matrix6::zeros();
+    adjoint.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+    adjoint.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
+    let lever = transform.translation.vector.cross_matrix() * rotation;
+    adjoint.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
+    adjoint
 }
 
 /// Rotation vector (rad) and its angle, 0 to pi.

@@ -14,6 +14,7 @@ pub use options::LidarOdometryOptions;
 pub use parameters::declare;
 
 use lattice_core::cloud::CloudLimits;
+use lattice_core::loop_closure::LoopCloser;
 use lattice_core::odometry::{
     LostCause, Odometry as Core, OdometryOptions, Prior, Scan, ScanResult, Verdict,
 };
@@ -75,6 +76,7 @@ pub struct LidarOdometry {
     last: Option<ScanResult>,
     /// End of the last scan with a certain pose.
     certain_ns: Option<i64>,
+    loops: Option<LoopCloser>,
 }
 
 impl LidarOdometry {
@@ -95,6 +97,7 @@ impl LidarOdometry {
             waiting: None,
             last: None,
             certain_ns: None,
+            loops: options.loops.then(LoopCloser::new),
             options,
         }
     }
@@ -166,10 +169,31 @@ impl LidarOdometry {
         let result = self.register(&scan)?;
         self.count(&result);
         self.last = Some(result.clone());
+        self.close_loop(&result);
         Some(Registered {
             tag: scan.tag,
             result,
         })
+    }
+
+    /// Looks for a loop that the newest scan completes.
+    fn close_loop(&mut self, result: &ScanResult) {
+        let (Some(loops), Some(sizes)) = (&mut self.loops, self.core.sizes()) else {
+            return;
+        };
+        // Sizes that gave the scan a lattice give one here.
+        if let Err(error) = loops.add(result, self.core.centroids_m(), sizes.centroids_m) {
+            log::debug!("no loop is sought: {error}");
+        }
+    }
+
+    /// Ends the drive and gives its loops; none if they are not sought, or if the log began again.
+    pub fn finish_loops(&mut self) -> Option<LoopCloser> {
+        let mut loops = self.loops.take()?;
+        if let Err(error) = loops.finish() {
+            log::debug!("no loop is sought: {error}");
+        }
+        Some(loops)
     }
 
     fn register_if_complete(&mut self) -> Option<Registered> {
@@ -219,7 +243,7 @@ impl LidarOdometry {
         {
             if last_ns.saturating_sub(times.last_ns) > CLOCK_JUMP_NS {
                 // A log that loops: another drive.
-                (self.last, self.certain_ns) = (None, None);
+                (self.last, self.certain_ns, self.loops) = (None, None, None);
                 self.core = Core::new(OdometryOptions {
                     lattice: options.lattice,
                 });

@@ -28,6 +28,8 @@ pub struct LidarOdometryOptions {
     pub deskew: bool,
     /// Lattice of the map of the scans before.
     pub lattice: LatticeKind,
+    /// True if loops are sought, for a trajectory that is corrected at its end.
+    pub loops: bool,
 }
 
 impl Default for LidarOdometryOptions {
@@ -42,12 +44,13 @@ impl Default for LidarOdometryOptions {
             time: TimeOptions::default(),
             deskew: true,
             lattice: LatticeKind::Fcc,
+            loops: false,
         }
     }
 }
 
 impl LidarOdometryOptions {
-    /// Options for the clouds of a transformer, with poses in its map frame.
+    /// Options for the clouds of a transformer, with poses in its map frame and loops.
     pub fn of(transformer: &TransformerOptions) -> Self {
         Self {
             odom_frame: transformer.map_frame.clone(),
@@ -57,6 +60,7 @@ impl LidarOdometryOptions {
             max_cloud_points: transformer.max_cloud_points,
             time: transformer.time.clone(),
             deskew: transformer.deskew,
+            loops: true,
             ..Self::default()
         }
     }
@@ -78,6 +82,7 @@ impl LidarOdometryOptions {
             time: time_options(params)?,
             deskew: params.bool("deskew", defaults.deskew)?,
             lattice: defaults.lattice,
+            loops: defaults.loops,
         };
         if options.min_range_m > options.max_range_m {
             let problem = format!("expected at most `max_range_m`, {max_range_m}");

@@ -1,8 +1,9 @@
 //! Poses for a log that has none: lidar odometry over its clouds.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use lattice_bag::{BagReader, ReadOptions};
+use lattice_core::loop_closure::LoopCloser;
 use lattice_core::odometry::{ScanResult, Verdict};
 use lattice_msgs::cdr;
 use lattice_msgs::nav_msgs::Odometry;
@@ -26,7 +27,13 @@ pub struct ScanPosesReport {
     pub counts: OdometryCounts,
     /// Topic of the gyroscope; empty: none.
     pub imu_topic: String,
-    /// Scans that are `OK` in the submap that is mapped.
+    /// Loops that closed, and those that were tried and did not.
+    pub loops_closed: u64,
+    /// Loops whose registration was not certain, or that the others contradict.
+    pub loops_refused: u64,
+    /// Submaps that are mapped: joined by loops.
+    pub submaps_mapped: u64,
+    /// Scans that are `OK` in the submaps that are mapped.
     pub scans_mapped: u64,
     /// Scans that are `OK` in submaps whose place in the mapped one is unknown.
     pub scans_elsewhere: u64,
@@ -97,14 +104,16 @@ impl std::fmt::Display for ScanPosesReport {
         let counts = &self.counts;
         write!(
             f,
-            "odometry: {} scans of {}: {} OK, {} WEAK, {} LOST; path {:.1} m; {} mapped, {} submaps",
+            "odometry: {} scans of {}: {} OK, {} WEAK, {} LOST; path {:.1} m, {} loops closed; {} mapped, {} of {} submaps",
             counts.clouds_in,
             self.topic,
             counts.scans_ok,
             counts.scans_weak,
             counts.scans_lost(),
             counts.path_m,
+            self.loops_closed,
             self.scans_mapped,
+            self.submaps_mapped,
             counts.submaps
         )
     }
@@ -187,8 +196,9 @@ pub(super) struct ScanPoses {
     scans: BTreeMap<i64, ScanResult>,
     odom_frame: String,
     base_frame: String,
-    /// The submap with the most scans that are `OK`.
-    mapped: u32,
+    /// The submaps that loops join, with the most scans that are `OK`.
+    mapped: BTreeSet<u32>,
+    loops: LoopCloser,
     /// Time of the newest pose given.
     given_ns: Option<i64>,
     pub topic: usize,
@@ -196,7 +206,7 @@ pub(super) struct ScanPoses {
 }
 
 impl ScanPoses {
-    /// Runs the odometry over the clouds of a topic up to a log time.
+    /// Runs the odometry over the clouds of a topic up to a log time, and corrects its poses by loops.
     pub fn of(
         bag: &BagReader,
         plan: &TopicPlan,
@@ -220,14 +230,27 @@ impl ScanPoses {
         for scan in scans.values().filter(|scan| scan.verdict == Verdict::Ok) {
             *in_submaps.entry(scan.submap).or_default() += 1;
         }
+        let loops = machine.finish_loops().unwrap_or_default();
+        let count = |submaps: &BTreeSet<u32>| -> u64 {
+            submaps.iter().filter_map(|one| in_submaps.get(one)).sum()
+        };
+        let joined = in_submaps.keys().map(|submap| loops.joined_with(*submap));
         // The earliest of equals.
-        let best = in_submaps.iter().rev().max_by_key(|(_, count)| **count);
-        let (mapped, scans_mapped) = best.map_or((0, 0), |(submap, count)| (*submap, *count));
+        let mapped = joined.rev().max_by_key(count).unwrap_or_default();
+        let scans_mapped = count(&mapped);
+        let closed = loops.attempts().iter().filter(|attempt| attempt.is_closed);
+        let loops_closed = closed.count() as u64;
         Ok(Self {
             report: ScanPosesReport {
                 topic: name.to_owned(),
                 imu_topic: imu_name.to_owned(),
                 counts: machine.counts().clone(),
+                loops_closed,
+                loops_refused: loops.attempts().len() as u64 - loops_closed,
+                submaps_mapped: mapped
+                    .iter()
+                    .filter(|one| in_submaps.contains_key(one))
+                    .count() as u64,
                 scans_mapped,
                 scans_elsewhere: in_submaps.values().sum::<u64>() - scans_mapped,
                 refusals: machine.refusals().to_vec(),
@@ -236,6 +259,7 @@ impl ScanPoses {
             odom_frame,
             base_frame,
             mapped,
+            loops,
             given_ns: None,
             topic,
         })
@@ -244,12 +268,14 @@ impl ScanPoses {
     /// Poses that cover the cloud of a log time; `None` if it is not to be mapped.
     pub fn poses(&mut self, log_time_ns: i64) -> Option<Vec<Odometry>> {
         let is_mapped =
-            |scan: &&ScanResult| scan.verdict == Verdict::Ok && scan.submap == self.mapped;
+            |scan: &&ScanResult| scan.verdict == Verdict::Ok && self.mapped.contains(&scan.submap);
         let scan = self.scans.get(&log_time_ns).filter(is_mapped)?;
         let before = self.scans.range(..log_time_ns).next_back();
         let before = before.map(|(_, scan)| scan).filter(is_mapped);
-        let follows =
-            |before: &&ScanResult| scan.first_ns.saturating_sub(before.end_ns) <= PAUSE_NS;
+        let follows = |before: &&ScanResult| {
+            let pause_ns = scan.first_ns.saturating_sub(before.end_ns);
+            before.submap == scan.submap && pause_ns <= PAUSE_NS
+        };
         let mut poses = vec![self.message(scan)];
         if let Some(before) = before.filter(follows) {
             if self.given_ns != Some(before.end_ns) {
@@ -262,7 +288,10 @@ impl ScanPoses {
         Some(poses)
     }
 
+    /// The pose, corrected by the loops.
     fn message(&self, scan: &ScanResult) -> Odometry {
-        odometry_message(&self.odom_frame, &self.base_frame, scan)
+        let mut corrected = scan.clone();
+        corrected.odom_from_base = self.loops.map_from_base(scan);
+        odometry_message(&self.odom_frame, &self.base_frame, &corrected)
     }
 }

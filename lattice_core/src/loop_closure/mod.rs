@@ -1,0 +1,383 @@
+//! Loop closure: places that a drive comes back to, found, verified, and used to correct all its poses.
+//!
+//! A drive is cut into segments. Where a new segment lies near an older one, the surfaces of both are registered without a
+//! guess ([`register_global`](crate::registration::register_global)). A result that is `OK` and that the graph of poses
+//! explains closes the loop, and [`PoseGraph`] moves all poses to the least squares of motions and loops. A loop that the
+//! others contradict is withdrawn.
+
+mod history;
+mod pose_graph;
+mod segment;
+#[cfg(test)]
+mod tests;
+mod verify;
+
+use std::collections::BTreeSet;
+
+use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+
+pub use history::PlaceHistory;
+pub use pose_graph::{LoopEdge, PoseGraph};
+
+use crate::lattice::LatticeError;
+use crate::odometry::{ScanResult, Verdict};
+use crate::pose::se3;
+use crate::registration::Verdict as RegistrationVerdict;
+use segment::{GrowingSegment, Segment};
+use verify::register_segments;
+
+/// Distance between segments that share enough surfaces, in root mean squares of the distances of their points.
+const REACH_ARMS: f64 = 1.0;
+/// Drift that a look-up allows for, as a part of that distance: it visits more cells with more.
+const DRIFT_PART: f64 = 1.0;
+/// Length of the path between two segments of a loop, in the same unit: below, the odometry has both in its map.
+const LEAST_PATH_ARMS: f64 = 4.0;
+/// Standard deviation of the position between two segments from which a loop closure adds to it, m: three times that of the
+/// closures of simulated drives.
+const LEAST_SIGMA_M: f64 = 0.05;
+/// Segments on both sides of the nearest one that are its surroundings.
+const AROUND: usize = 2;
+/// Squared Mahalanobis distance up to which the graph explains a loop: that of 99.9 % with 6 degrees of freedom.
+const EXPLAINED: f64 = 22.5;
+/// Standard deviation of the predicted motion between two submaps, m and rad: a second or more by constant velocity. A hall
+/// that is turned by half a turn has to stay beyond `EXPLAINED`.
+const PREDICTED: (f64, f64) = (5.0, 0.3);
+
+/// A loop that was tried.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct LoopAttempt {
+    /// Number of the earlier segment.
+    pub from: usize,
+    /// Number of the later segment.
+    pub to: usize,
+    /// Times of the poses of both, ns.
+    pub stamps_ns: [i64; 2],
+    /// Verdict of the registration.
+    pub verdict: RegistrationVerdict,
+    /// Reason for the verdict.
+    pub reason: String,
+    /// Squared Mahalanobis distance from what the graph predicts.
+    pub innovation: f64,
+    /// True if the loop closes: the verdict is `OK` and the graph explains it.
+    pub is_closed: bool,
+    /// Pose of the later segment in the frame of the earlier one, as registered.
+    pub from_to: Isometry3<f64>,
+}
+
+/// Finds loops among the scans of a drive, and corrects its poses.
+pub struct LoopCloser {
+    segments: Vec<Segment>,
+    growing: Option<GrowingSegment>,
+    graph: PoseGraph,
+    history: Option<PlaceHistory>,
+    path_m: f64,
+    last: Option<(u32, Vector3<f64>)>,
+    attempts: Vec<LoopAttempt>,
+    /// Loops between submaps that are not joined, one of which cannot be held against motions: another has to agree.
+    alone: Vec<LoopEdge>,
+}
+
+impl LoopCloser {
+    /// A drive without scans.
+    pub fn new() -> LoopCloser {
+        LoopCloser {
+            segments: Vec::new(),
+            growing: None,
+            graph: PoseGraph::default(),
+            history: None,
+            path_m: 0.0,
+            last: None,
+            attempts: Vec::new(),
+            alone: Vec::new(),
+        }
+    }
+
+    /// Takes a scan with its centroids, metres in the frame of the base at its pose, of cells of `side_m`; gives the loop that was
+    /// tried, if a segment was completed by it and lies near another. Scans that are not `OK` are passed over.
+    ///
+    /// Fails if `side_m` gives no lattice.
+    pub fn add(
+        &mut self,
+        scan: &ScanResult,
+        centroids_m: &[Vector3<f64>],
+        side_m: f64,
+    ) -> Result<Option<&LoopAttempt>, LatticeError> {
+        if scan.verdict != Verdict::Ok {
+            return Ok(None);
+        }
+        let place_m = scan.odom_from_base.translation.vector;
+        let last = self.last.replace((scan.submap, place_m));
+        self.path_m += last
+            .filter(|(submap, _)| *submap == scan.submap)
+            .map_or(0.0, |(_, last_m)| (place_m - last_m).norm());
+        if let Some(growing) = self.growing.as_mut().filter(|one| !one.is_ended_by(scan)) {
+            growing.add(scan, centroids_m);
+            return Ok(None);
+        }
+        let ended = self.growing.take();
+        self.growing = Some(GrowingSegment::new(scan, centroids_m, side_m, self.path_m)?);
+        match ended {
+            Some(ended) => self.complete(ended.finish()),
+            None => Ok(None),
+        }
+    }
+
+    /// Completes the last segment; gives the loop that was tried, if it lies near another.
+    pub fn finish(&mut self) -> Result<Option<&LoopAttempt>, LatticeError> {
+        match self.growing.take() {
+            Some(last) => self.complete(last.finish()),
+            None => Ok(None),
+        }
+    }
+
+    fn complete(&mut self, segment: Segment) -> Result<Option<&LoopAttempt>, LatticeError> {
+        match self.segments.last() {
+            None => self.graph.push(segment.odom_from_anchor, Matrix6::zeros()),
+            Some(before) => {
+                let (motion, covariance) = motion_between(before, &segment);
+                self.graph.push(motion, covariance);
+            }
+        }
+        if self.history.is_none() {
+            let radius_m = REACH_ARMS * (1.0 + DRIFT_PART) * segment.arm_m;
+            self.history = Some(PlaceHistory::new(radius_m)?);
+        }
+        self.segments.push(segment);
+        let to = self.segments.len() - 1;
+        let found = self.candidate(to).and_then(|from| self.try_loop(from, to));
+        let is_closed = found.as_ref().is_some_and(|attempt| attempt.is_closed);
+        match is_closed {
+            true => self.remember_all(),
+            false => self.remember(to),
+        }
+        self.attempts.extend(found.clone());
+        Ok(found.and(self.attempts.last()))
+    }
+
+    /// The nearest older segment with which a loop would add to what is known.
+    fn candidate(&mut self, to: usize) -> Option<usize> {
+        let segment = self.segments.get(to)?;
+        let (path_m, arm_m, submap) = (segment.path_m, segment.arm_m, segment.submap);
+        let place_m = self.graph.poses().get(to)?.translation.vector;
+        let near = self.history.as_ref()?.near(&place_m);
+        for (number, distance_m) in near {
+            let from = number as usize;
+            let Some(older) = self.segments.get(from) else {
+                continue;
+            };
+            let is_same = older.submap == submap;
+            if is_same && path_m - older.path_m < LEAST_PATH_ARMS * arm_m {
+                continue;
+            }
+            let (_, covariance) = self.graph.relative(from, to)?;
+            let spread = covariance.fixed_view::<3, 3>(0, 0).into_owned();
+            let sigma_m = spread.symmetric_eigenvalues().max().max(0.0).sqrt();
+            if distance_m > REACH_ARMS * arm_m + 3.0 * sigma_m {
+                return None;
+            }
+            return (sigma_m > LEAST_SIGMA_M).then_some(from);
+        }
+        None
+    }
+
+    fn try_loop(&mut self, from: usize, to: usize) -> Option<LoopAttempt> {
+        let (_, covariance) = self.graph.relative(from, to)?;
+        let turns = covariance.fixed_view::<3, 3>(3, 3).into_owned();
+        let tilt_sigma_rad = turns.symmetric_eigenvalues().max().max(0.0).sqrt();
+        let older_submap = self.segments.get(from)?.submap;
+        let newer_submap = self.segments.get(to)?.submap;
+        let around = (from.saturating_sub(AROUND)..=from + AROUND).filter(|number| *number != from);
+        let target = self.placed(std::iter::once(from).chain(around), older_submap, to);
+        let source = self.placed([to, to.saturating_sub(1)].into_iter(), newer_submap, to + 1);
+        let found = register_segments(&target, &source, tilt_sigma_rad)?;
+        let edge = LoopEdge {
+            from,
+            to,
+            from_to: found.target_from_source,
+            covariance: found.covariance,
+        };
+        let is_ok = found.verdict == RegistrationVerdict::Ok;
+        let innovation = self.graph.innovation(&edge);
+        if is_ok && innovation <= EXPLAINED {
+            self.close(edge);
+        }
+        let is_closed = self.graph.loops().iter().any(|edge| edge.to == to);
+        let stamp_ns = |number: usize| self.segments.get(number).map_or(0, |one| one.first_ns);
+        Some(LoopAttempt {
+            from,
+            to,
+            stamps_ns: [stamp_ns(from), stamp_ns(to)],
+            verdict: found.verdict,
+            reason: found.reason,
+            innovation,
+            is_closed,
+            from_to: found.target_from_source,
+        })
+    }
+
+    /// Closes a loop. The first one between two submaps waits for another that agrees with it.
+    fn close(&mut self, edge: LoopEdge) {
+        let submap_of = |number: usize| self.segments.get(number).map_or(0, |one| one.submap);
+        let ends = |edge: &LoopEdge| (submap_of(edge.from), submap_of(edge.to));
+        let (older, newer) = ends(&edge);
+        if self.joined_with(older).contains(&newer) {
+            self.graph.close(edge);
+            return self.settle();
+        }
+        // Sources of neighbours overlap.
+        let is_other = |one: &&LoopEdge| ends(one) == (older, newer) && one.to + 1 < edge.to;
+        let agreeing = self.alone.iter().filter(is_other).find(|one| {
+            let mut graph = self.graph.clone();
+            graph.close((*one).clone());
+            graph.optimize() && graph.innovation(&edge) <= EXPLAINED
+        });
+        let Some(agreeing) = agreeing.cloned() else {
+            return self.alone.push(edge);
+        };
+        self.alone.retain(|one| *one != agreeing);
+        for attempt in self.attempts.iter_mut().filter(|one| one.to == agreeing.to) {
+            attempt.is_closed = true;
+        }
+        self.graph.close(agreeing);
+        self.graph.close(edge);
+        self.settle();
+    }
+
+    /// Optimizes the graph, without the loops that the others contradict.
+    fn settle(&mut self) {
+        while !self.graph.loops().is_empty() {
+            let worst = match self.graph.optimize() {
+                true => {
+                    let residuals = self.graph.residuals().into_iter().enumerate();
+                    residuals
+                        .max_by(|a, b| a.1.total_cmp(&b.1))
+                        .filter(|(_, residual)| *residual > EXPLAINED)
+                }
+                false => Some((self.graph.loops().len() - 1, f64::INFINITY)),
+            };
+            let Some((number, _)) = worst else {
+                break;
+            };
+            let to = self.graph.loops().get(number).map(|edge| edge.to);
+            self.graph.retain(|edge| Some(edge.to) != to);
+            for attempt in self
+                .attempts
+                .iter_mut()
+                .filter(|attempt| Some(attempt.to) == to)
+            {
+                attempt.is_closed = false;
+            }
+        }
+    }
+
+    /// The submaps whose places in that of a submap are known: joined with it by loops.
+    pub fn joined_with(&self, submap: u32) -> BTreeSet<u32> {
+        let of = |number: usize| self.segments.get(number).map(|segment| segment.submap);
+        let mut joined = BTreeSet::from([submap]);
+        loop {
+            let before = joined.len();
+            for edge in self.graph.loops() {
+                if let (Some(a), Some(b)) = (of(edge.from), of(edge.to))
+                    && (joined.contains(&a) || joined.contains(&b))
+                {
+                    joined.extend([a, b]);
+                }
+            }
+            if joined.len() == before {
+                return joined;
+            }
+        }
+    }
+
+    /// Segments before one, of a submap, with the poses of their anchors.
+    fn placed(
+        &self,
+        numbers: impl Iterator<Item = usize>,
+        submap: u32,
+        before: usize,
+    ) -> Vec<(&Segment, Isometry3<f64>)> {
+        let of = |number: usize| {
+            let segment = self.segments.get(number)?;
+            Some((segment, *self.graph.poses().get(number)?))
+        };
+        let all = numbers.filter(|number| *number < before).filter_map(of);
+        all.filter(|(segment, _)| segment.submap == submap)
+            .collect()
+    }
+
+    fn remember(&mut self, number: usize) {
+        let pose = self.graph.poses().get(number);
+        if let (Some(history), Some(pose)) = (&mut self.history, pose) {
+            history.add(number as u32, &pose.translation.vector);
+        }
+    }
+
+    /// Makes the history anew, after poses have changed.
+    fn remember_all(&mut self) {
+        if let Some(history) = &mut self.history {
+            history.clear();
+        }
+        (0..self.segments.len()).for_each(|number| self.remember(number));
+    }
+
+    /// All loops that were tried, in order of time.
+    pub fn attempts(&self) -> &[LoopAttempt] {
+        &self.attempts
+    }
+
+    /// Pose of a scan in the map: that by odometry with the corrections of the segments before and after it.
+    pub fn map_from_base(&self, scan: &ScanResult) -> Isometry3<f64> {
+        self.map_from_odom(scan.submap, scan.end_ns) * scan.odom_from_base
+    }
+
+    /// The correction of poses by odometry at a time.
+    pub fn map_from_odom(&self, submap: u32, stamp_ns: i64) -> Isometry3<f64> {
+        let of = |number: usize| -> Option<(i64, Isometry3<f64>)> {
+            let (segment, pose) = (self.segments.get(number)?, self.graph.poses().get(number)?);
+            let correction = pose * segment.odom_from_anchor.inverse();
+            (segment.submap == submap).then_some((segment.first_ns, correction))
+        };
+        let key = |segment: &Segment| (segment.submap, segment.first_ns);
+        let next = self
+            .segments
+            .partition_point(|segment| key(segment) <= (submap, stamp_ns));
+        match (next.checked_sub(1).and_then(of), of(next)) {
+            (Some((from_ns, from)), Some((to_ns, to))) => {
+                let span_ns = to_ns.saturating_sub(from_ns).max(1) as f64;
+                let part = stamp_ns.saturating_sub(from_ns) as f64 / span_ns;
+                let twist = se3::log(&(from.inverse() * to));
+                from * se3::exp(&(twist * part.clamp(0.0, 1.0)))
+            }
+            (Some((_, only)), None) | (None, Some((_, only))) => only,
+            (None, None) => Isometry3::identity(),
+        }
+    }
+}
+
+impl Default for LoopCloser {
+    fn default() -> Self {
+        LoopCloser::new()
+    }
+}
+
+/// Motion between the anchors of two segments, with the covariance of its twist in the frame of the first one.
+fn motion_between(before: &Segment, after: &Segment) -> (Isometry3<f64>, Matrix6<f64>) {
+    let before_from_odom = before.odom_from_anchor.inverse();
+    let motion = before_from_odom * after.odom_from_anchor;
+    if before.submap != after.submap {
+        let (m, rad) = (PREDICTED.0 * PREDICTED.0, PREDICTED.1 * PREDICTED.1);
+        let diagonal = Vector6::new(m, m, m, rad, rad, rad);
+        return (motion, Matrix6::from_diagonal(&diagonal));
+    }
+    let adjoint = se3::adjoint(&before_from_odom);
+    let grown = adjoint * (after.drift - before.drift) * adjoint.transpose();
+    (motion, positive(grown))
+}
+
+/// The nearest matrix without negative variances: rounding must not leave one.
+fn positive(covariance: Matrix6<f64>) -> Matrix6<f64> {
+    let mut eigen = (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
+    eigen.eigenvalues.apply(|value| *value = value.max(0.0));
+    eigen.recompose()
+}

@@ -1,0 +1,119 @@
+//! Segments of a drive: the surfaces that some scans in a row have seen, in one frame.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
+
+use crate::lattice::{Lattice, LatticeError, LatticeKind};
+use crate::odometry::{MomentMap, ScanResult};
+
+/// Length of a segment in root mean squares of the distances of its points: neighbours see the same surfaces.
+const LENGTH_ARMS: f64 = 0.5;
+/// Cells of a segment.
+const MAX_CELLS: usize = 30_000;
+
+/// The surfaces that the scans of a stretch have seen, in the frame of the base at the first of them.
+#[derive(Clone, Debug)]
+pub(super) struct Segment {
+    /// Number of the submap of the odometry.
+    pub submap: u32,
+    /// Time of the pose of the first scan, ns.
+    pub first_ns: i64,
+    /// Length of the path up to the first scan, m.
+    pub path_m: f64,
+    /// Pose of the first scan by odometry.
+    pub odom_from_anchor: Isometry3<f64>,
+    /// Covariance of the twist of that pose in `odom` since the beginning of the submap.
+    pub drift: Matrix6<f64>,
+    /// Centroids of cells, metres, in the frame of the anchor.
+    pub points_m: Vec<[f32; 3]>,
+    /// Root mean square of the distances of the points of its scans, m.
+    pub arm_m: f64,
+    /// Side of the cells, m.
+    pub side_m: f64,
+}
+
+impl Segment {
+    /// The points in the frame to which a pose of the anchor leads.
+    pub fn points_at<'a>(
+        &'a self,
+        pose: &'a Isometry3<f64>,
+    ) -> impl Iterator<Item = Vector3<f64>> + 'a {
+        let point = move |point: &[f32; 3]| (pose * Point3::from(point.map(f64::from))).coords;
+        self.points_m.iter().map(point)
+    }
+}
+
+/// A segment that still grows.
+pub(super) struct GrowingSegment {
+    segment: Segment,
+    cells: MomentMap,
+}
+
+impl GrowingSegment {
+    /// A segment that a scan begins. `centroids_m`: in the frame of the base at the pose of the scan.
+    ///
+    /// Fails if `side_m` gives no lattice.
+    pub fn new(
+        scan: &ScanResult,
+        centroids_m: &[Vector3<f64>],
+        side_m: f64,
+        path_m: f64,
+    ) -> Result<GrowingSegment, LatticeError> {
+        let squares: f64 = centroids_m.iter().map(Vector3::norm_squared).sum();
+        let segment = Segment {
+            submap: scan.submap,
+            first_ns: scan.end_ns,
+            path_m,
+            odom_from_anchor: scan.odom_from_base,
+            drift: about_origin(&scan.drift, &scan.odom_from_base.translation.vector),
+            points_m: Vec::new(),
+            arm_m: (squares / centroids_m.len().max(1) as f64).sqrt(),
+            side_m,
+        };
+        let lattice = Lattice::new(LatticeKind::Fcc, side_m.powi(3))?;
+        let mut growing = GrowingSegment {
+            segment,
+            cells: MomentMap::new(lattice, MAX_CELLS),
+        };
+        growing.add(scan, centroids_m);
+        Ok(growing)
+    }
+
+    /// True if a scan is of another submap or beyond the end of the segment.
+    pub fn is_ended_by(&self, scan: &ScanResult) -> bool {
+        let Segment {
+            submap,
+            odom_from_anchor,
+            arm_m,
+            ..
+        } = &self.segment;
+        let moved = odom_from_anchor.inverse() * scan.odom_from_base;
+        // Half a turn in place shows nothing new to a lidar that sees all around, and half of it to others.
+        let moved_m = moved.translation.vector.norm();
+        scan.submap != *submap || moved_m > LENGTH_ARMS * arm_m
+    }
+
+    /// Adds the centroids of a scan, in the frame of the base at its pose.
+    pub fn add(&mut self, scan: &ScanResult, centroids_m: &[Vector3<f64>]) {
+        let anchor_from_base = self.segment.odom_from_anchor.inverse() * scan.odom_from_base;
+        let place = |point: &Vector3<f64>| (anchor_from_base * Point3::from(*point)).coords;
+        let placed: Vec<_> = centroids_m.iter().map(place).collect();
+        self.cells.add(&placed);
+    }
+
+    /// The segment as it is.
+    pub fn finish(self) -> Segment {
+        let point = |point: &Vector3<f64>| [point.x as f32, point.y as f32, point.z as f32];
+        Segment {
+            points_m: self.cells.centroids_m().iter().map(point).collect(),
+            ..self.segment
+        }
+    }
+}
+
+/// Covariance of a perturbation (translation, rotation) about a place as that of a twist about the origin of the same axes.
+pub(super) fn about_origin(covariance: &Matrix6<f64>, place_m: &Vector3<f64>) -> Matrix6<f64> {
+    let mut to_origin = Matrix6::identity();
+    let lever: Matrix3<f64> = place_m.cross_matrix();
+    to_origin.fixed_view_mut::<3, 3>(0, 3).copy_from(&lever);
+    to_origin * covariance * to_origin.transpose()
+}
