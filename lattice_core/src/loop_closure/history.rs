@@ -41,6 +41,11 @@ impl PlaceHistory {
         })
     }
 
+    /// Radius of a look-up, m.
+    pub fn radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
     /// Cells that a look-up visits.
     pub fn cells_visited(&self) -> usize {
         self.steps.len()

@@ -30,18 +30,24 @@ use verify::register_segments;
 const REACH_ARMS: f64 = 1.0;
 /// Drift that a look-up allows for, as a part of that distance: it visits more cells with more.
 const DRIFT_PART: f64 = 1.0;
+/// Factor of the distance from which the history is made anew with a larger radius.
+const WIDER: f64 = 1.5;
 /// Length of the path between two segments of a loop, in the same unit: below, the odometry has both in its map.
 const LEAST_PATH_ARMS: f64 = 4.0;
 /// Standard deviation of the position between two segments from which a loop closure adds to it, m: three times that of the
 /// closures of simulated drives.
 const LEAST_SIGMA_M: f64 = 0.05;
+/// Loops after which that deviation grows with their number: a drive then has as many as the cube root of its length, and the
+/// system of the graph stays small.
+const MANY_LOOPS: usize = 200;
 /// Segments on both sides of the nearest one that are its surroundings.
 const AROUND: usize = 2;
 /// Squared Mahalanobis distance up to which the graph explains a loop: that of 99.9 % with 6 degrees of freedom.
 const EXPLAINED: f64 = 22.5;
-/// Standard deviation of the predicted motion between two submaps, m and rad: a second or more by constant velocity. A hall
-/// that is turned by half a turn has to stay beyond `EXPLAINED`.
-const PREDICTED: (f64, f64) = (5.0, 0.3);
+/// Standard deviations of the predicted motion between two submaps: of the translation, in root mean squares of the distances of
+/// points, and of the rotation, rad. In simulated streets predictions are off by up to 25 m, where a car ahead deceived the
+/// scans before. A hall that looks the same after a quarter or half a turn has to stay beyond `EXPLAINED`.
+const PREDICTED: (f64, f64) = (1.0, 0.3);
 
 /// A loop that was tried.
 #[derive(Clone, Debug, PartialEq)]
@@ -139,18 +145,21 @@ impl LoopCloser {
                 self.graph.push(motion, covariance);
             }
         }
-        if self.history.is_none() {
-            let radius_m = REACH_ARMS * (1.0 + DRIFT_PART) * segment.arm_m;
-            self.history = Some(PlaceHistory::new(radius_m)?);
-        }
+        // A drive that leaves a house sees farther.
+        let radius_m = REACH_ARMS * (1.0 + DRIFT_PART) * segment.arm_m;
+        let is_enough = |history: &PlaceHistory| WIDER * history.radius_m() >= radius_m;
         self.segments.push(segment);
+        if !self.history.as_ref().is_some_and(is_enough) {
+            self.history = Some(PlaceHistory::new(radius_m)?);
+            self.remember_all();
+        }
         let to = self.segments.len() - 1;
         let found = self.candidate(to).and_then(|from| self.try_loop(from, to));
         let is_closed = found.as_ref().is_some_and(|attempt| attempt.is_closed);
-        match is_closed {
-            true => self.remember_all(),
-            false => self.remember(to),
+        if is_closed {
+            self.remember_all();
         }
+        self.remember(to);
         self.attempts.extend(found.clone());
         Ok(found.and(self.attempts.last()))
     }
@@ -176,7 +185,8 @@ impl LoopCloser {
             if distance_m > REACH_ARMS * arm_m + 3.0 * sigma_m {
                 return None;
             }
-            return (sigma_m > LEAST_SIGMA_M).then_some(from);
+            let many = self.graph.loops().len() as f64 / MANY_LOOPS as f64;
+            return (sigma_m > LEAST_SIGMA_M * many.max(1.0)).then_some(from);
         }
         None
     }
@@ -313,12 +323,13 @@ impl LoopCloser {
         }
     }
 
-    /// Makes the history anew, after poses have changed.
+    /// Makes the history of all segments but the newest anew, after poses or the radius have changed.
     fn remember_all(&mut self) {
         if let Some(history) = &mut self.history {
             history.clear();
         }
-        (0..self.segments.len()).for_each(|number| self.remember(number));
+        let before_newest = 0..self.segments.len().saturating_sub(1);
+        before_newest.for_each(|number| self.remember(number));
     }
 
     /// All loops that were tried, in order of time.
@@ -366,7 +377,7 @@ fn motion_between(before: &Segment, after: &Segment) -> (Isometry3<f64>, Matrix6
     let before_from_odom = before.odom_from_anchor.inverse();
     let motion = before_from_odom * after.odom_from_anchor;
     if before.submap != after.submap {
-        let (m, rad) = (PREDICTED.0 * PREDICTED.0, PREDICTED.1 * PREDICTED.1);
+        let (m, rad) = ((PREDICTED.0 * before.arm_m).powi(2), PREDICTED.1.powi(2));
         let diagonal = Vector6::new(m, m, m, rad, rad, rad);
         return (motion, Matrix6::from_diagonal(&diagonal));
     }

@@ -224,6 +224,7 @@ proptest! {
         let at_m = place();
         let near: BTreeSet<u32> = history.near(&at_m).iter().map(|(number, _)| *number).collect();
         let all = (0..).zip(&places).filter(|(_, place_m)| (*place_m - at_m).norm() <= radius_m);
+        prop_assert_eq!(history.cells_visited(), 87);
         prop_assert_eq!(near, all.map(|(number, _)| number).collect::<BTreeSet<u32>>());
     }
 }

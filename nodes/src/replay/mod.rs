@@ -307,9 +307,9 @@ pub fn run(
     let mut odometry = match plan.odometry {
         Some(topic) => {
             let options = LidarOdometryOptions::of(pipeline.transformer.options());
-            let end_ns = (!whole).then_some(to_ns);
             let told = &mut |log_time_ns| tell(log_time_ns, 0.0, ODOMETRY_PART);
-            Some(ScanPoses::of(bag, plan, topic, options, end_ns, told)?)
+            // The whole log for any slice, so that all have the same loops.
+            Some(ScanPoses::of(bag, plan, topic, options, told)?)
         }
         None => None,
     };

@@ -140,14 +140,12 @@ impl OdometryInput<'_> {
     }
 }
 
-/// Gives an odometry the transforms of a log, and `on_input` the clouds of a topic and the samples of the gyroscope, up to
-/// a log time.
+/// Gives an odometry the transforms of a log, and `on_input` the clouds of a topic and the samples of the gyroscope.
 pub fn feed_odometry(
     bag: &BagReader,
     plan: &TopicPlan,
     topic: usize,
     machine: &mut LidarOdometry,
-    end_ns: Option<i64>,
     on_input: &mut dyn FnMut(&mut LidarOdometry, OdometryInput),
     progress: &mut dyn FnMut(i64),
 ) -> Result<(), TopicError> {
@@ -160,7 +158,6 @@ pub fn feed_odometry(
     topics.extend(plan.imu.map(|imu| name(imu).to_owned()));
     let read = ReadOptions {
         topics: Some(topics),
-        end_ns,
         ..ReadOptions::default()
     };
     for message in bag.messages(&read)? {
@@ -206,13 +203,12 @@ pub(super) struct ScanPoses {
 }
 
 impl ScanPoses {
-    /// Runs the odometry over the clouds of a topic up to a log time, and corrects its poses by loops.
+    /// Runs the odometry over the clouds of a topic, and corrects its poses by loops.
     pub fn of(
         bag: &BagReader,
         plan: &TopicPlan,
         topic: usize,
         options: LidarOdometryOptions,
-        end_ns: Option<i64>,
         progress: &mut dyn FnMut(i64),
     ) -> Result<Self, TopicError> {
         let name = bag.topics().get(topic).map_or("", |topic| &topic.name);
@@ -225,7 +221,7 @@ impl ScanPoses {
             let found = input.give(machine).into_iter();
             scans.extend(found.map(|found| (found.tag, found.result)));
         };
-        feed_odometry(bag, plan, topic, &mut machine, end_ns, on_input, progress)?;
+        feed_odometry(bag, plan, topic, &mut machine, on_input, progress)?;
         let mut in_submaps: BTreeMap<u32, u64> = BTreeMap::new();
         for scan in scans.values().filter(|scan| scan.verdict == Verdict::Ok) {
             *in_submaps.entry(scan.submap).or_default() += 1;

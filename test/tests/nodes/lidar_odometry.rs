@@ -13,10 +13,11 @@ use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::sensor_msgs::{Imu, PointCloud2};
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lidar_odometry::{LidarOdometry, LidarOdometryOptions};
-use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
+use lattice_nodes::replay::{self, Pipeline, RunReport, Slice, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_test::clouds::{cloud, odometry, timed_cloud};
 use lattice_test::maps;
+use nalgebra::Isometry3;
 
 const START_NS: i64 = 1_700_000_000_000_000_000;
 
@@ -209,17 +210,20 @@ fn a_scan_waits_for_the_motion_to_its_end_and_is_predicted_by_it() {
     assert_eq!((counts.imu_refused, counts.wheels_refused), (1, 1));
 }
 
-/// A log of clouds alone: one room, and then a street.
-fn write_log(log: &Path) {
-    let mut writer = BagWriter::create(log, Storage::Mcap, WriterOptions::default()).unwrap();
-    let points = TopicSpec {
+fn points_topic() -> TopicSpec {
+    TopicSpec {
         name: "/points".into(),
         type_name: "sensor_msgs/msg/PointCloud2".into(),
         type_hash: String::new(),
         definition: None,
         offered_qos: Vec::new(),
-    };
-    let points = writer.add_topic(points).unwrap();
+    }
+}
+
+/// A log of clouds alone: one room, and then a street.
+fn write_log(log: &Path) {
+    let mut writer = BagWriter::create(log, Storage::Mcap, WriterOptions::default()).unwrap();
+    let points = writer.add_topic(points_topic()).unwrap();
     let scenes = [(DriveScene::Indoor, 30..60), (DriveScene::Town, 60..100)];
     for (scene, numbers) in scenes {
         let drive = Drive::new(scene, 1);
@@ -232,12 +236,9 @@ fn write_log(log: &Path) {
     writer.finish().unwrap();
 }
 
-#[test]
-fn a_replay_maps_one_submap_and_counts_the_scans_of_others() {
-    let folder = tempfile::tempdir().unwrap();
-    let log = folder.path().join("log");
-    write_log(&log);
-    let bag = BagReader::open(&log).unwrap();
+/// Report of a replay of a log, and the newest pose in the map.
+fn replayed(log: &Path) -> (RunReport, Isometry3<f64>) {
+    let bag = BagReader::open(log).unwrap();
     let plan = replay::plan(&bag, &TopicWishes::default()).unwrap();
     let mut transformer = TransformerOptions::new(plan.source);
     transformer.map_frame.clone_from(&plan.map_frame);
@@ -248,20 +249,23 @@ fn a_replay_maps_one_submap_and_counts_the_scans_of_others() {
         &MarkerOptions::default(),
     )
     .unwrap();
-    let report = replay::run(
-        &bag,
-        &plan,
-        &Slice::WHOLE,
-        &mut pipeline,
-        "log",
-        &mut |_| {},
-    );
-    let report = report.unwrap();
+    let slice = &Slice::WHOLE;
+    let report = replay::run(&bag, &plan, slice, &mut pipeline, "log", &mut |_| {}).unwrap();
+    (report, pipeline.newest_pose().unwrap().map_from_base)
+}
+
+#[test]
+fn a_replay_maps_one_submap_and_counts_the_scans_of_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("log");
+    write_log(&log);
+    let (report, _) = replayed(&log);
     let odometry = report.odometry.as_ref().unwrap();
     let (mapped, elsewhere) = (odometry.scans_mapped, odometry.scans_elsewhere);
     assert_eq!(mapped + elsewhere, odometry.counts.scans_ok);
     assert!(mapped > 15 && elsewhere > 15, "{odometry:?}");
-    assert_eq!(odometry.counts.submaps, 2);
+    assert_eq!((odometry.counts.submaps, odometry.submaps_mapped), (2, 1));
+    assert_eq!(odometry.loops_closed, 0);
     assert_eq!(report.transformer.counts.clouds_out, mapped);
     assert_eq!(report.transformer.counts.poses_out_of_order, 0);
     let said = report.to_string();
@@ -269,4 +273,35 @@ fn a_replay_maps_one_submap_and_counts_the_scans_of_others() {
         said.contains("in submaps whose place in the map is unknown"),
         "{said}"
     );
+}
+
+#[test]
+fn a_replay_corrects_its_poses_by_loops_and_joins_submaps() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("log");
+    let mut writer = BagWriter::create(&log, Storage::Mcap, WriterOptions::default()).unwrap();
+    let points = writer.add_topic(points_topic()).unwrap();
+    // A round and a half, with a gap that begins a submap.
+    let drive = Drive::new(DriveScene::IndoorAgain, 1);
+    let missing = 250..275;
+    let numbers = drive.scans().filter(|number| !missing.contains(number));
+    for number in numbers {
+        let scan = drive.scan(number);
+        let data = cdr::to_vec(&message(&scan, 0)).unwrap();
+        writer.write(points, START_NS + scan.end_ns, &data).unwrap();
+    }
+    writer.finish().unwrap();
+    let (report, pose) = replayed(&log);
+    let odometry = report.odometry.as_ref().unwrap();
+    assert_eq!(
+        (odometry.counts.submaps, odometry.submaps_mapped),
+        (2, 2),
+        "{odometry:?}"
+    );
+    assert!(odometry.loops_closed >= 3, "{odometry:?}");
+    assert_eq!(odometry.scans_elsewhere, 0);
+    let last = drive.scans().last().unwrap();
+    let truth = drive.pose(100_000_000).inverse() * drive.pose(100_000_000 * last);
+    let apart_m = (pose.translation.vector - truth.translation.vector).norm();
+    assert!(apart_m < 0.3, "{apart_m} m");
 }

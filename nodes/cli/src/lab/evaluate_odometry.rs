@@ -41,7 +41,7 @@ pub struct OfDrives {
 }
 
 /// Scenes of drives.
-pub const SCENES: [Choice<DriveScene>; 7] = [
+pub const SCENES: [Choice<DriveScene>; 9] = [
     ("town", "A circuit of streets", DriveScene::Town),
     ("indoor", "A circuit in a hall", DriveScene::Indoor),
     ("corridor", "A corridor with doors", DriveScene::Corridor),
@@ -53,6 +53,16 @@ pub const SCENES: [Choice<DriveScene>; 7] = [
         DriveScene::Blank,
     ),
     ("gap", "Two seconds without scans", DriveScene::Gap),
+    (
+        "town_again",
+        "The streets, and half of them again",
+        DriveScene::TownAgain,
+    ),
+    (
+        "indoor_again",
+        "The hall, and half of it again",
+        DriveScene::IndoorAgain,
+    ),
 ];
 
 impl OfDrives {

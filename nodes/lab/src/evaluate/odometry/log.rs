@@ -7,7 +7,7 @@ use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lidar_odometry::{LidarOdometry, LidarOdometryOptions, Registered};
 use lattice_nodes::replay::{OdometryInput, TopicWishes, feed_odometry, plan};
 
-use super::{Measurement, OdometryTrial, report_of};
+use super::{LoopTrial, Measurement, OdometryTrial, report_of};
 use crate::bench::timed;
 use crate::poses::read_tum;
 use crate::report::Report;
@@ -68,7 +68,7 @@ pub fn measure_log(
     let (start_ns, end_ns) = (bag.start_ns().unwrap_or(0), bag.end_ns().unwrap_or(0));
     let all_ns = end_ns.saturating_sub(start_ns).max(1) as f64;
     let told = &mut |time_ns: i64| progress(time_ns.saturating_sub(start_ns) as f64 / all_ns);
-    feed_odometry(&bag, &plan, topic, &mut machine, None, on_input, told)?;
+    feed_odometry(&bag, &plan, topic, &mut machine, on_input, told)?;
 
     let Some((first_ns, last_ns)) = span_ns else {
         let why = machine
@@ -85,6 +85,9 @@ pub fn measure_log(
              from {first} to {last} s; give the truth in the clock of the scans"
         );
         return Err(at(&of.truth)(why));
+    }
+    if let Some(loops) = machine.finish_loops() {
+        measurement.trial.loops = LoopTrial::of(&loops, &measurement.found, None);
     }
     let log = of.log.file_name().unwrap_or(of.log.as_os_str());
     let trial = OdometryTrial {

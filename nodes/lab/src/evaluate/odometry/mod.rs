@@ -1,16 +1,19 @@
 //! Odometry of a lidar measured in simulated drives and logs: drift, verdicts, and covariances against the truth.
 
 mod log;
+mod loops;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use lattice_core::loop_closure::LoopCloser;
 use lattice_core::odometry::{Odometry, OdometryOptions, Prior, Scan, ScanResult, Verdict};
 use lattice_nodes::files::atomic_write::write_text;
 use nalgebra::{Isometry3, Vector6};
 use serde::{Deserialize, Serialize};
 
 pub use log::{OdometryLog, measure_log};
+pub use loops::LoopTrial;
 
 use super::median;
 use crate::bench::{Spent, timed};
@@ -62,9 +65,12 @@ pub struct OdometryTrial {
     pub nees: Option<f64>,
     /// Mean wall time of a scan on the threads of the run, ms.
     pub ms: f64,
-    /// Mean processor time of a scan, ms.
+    /// Mean processor time of a scan, ms, without loops.
     #[serde(default)]
     pub cpu_ms: f64,
+    /// Loops, and the poses that they correct.
+    #[serde(default)]
+    pub loops: LoopTrial,
 }
 
 /// A pose with its truth, both since the beginning of the submap.
@@ -83,6 +89,9 @@ struct Measurement {
     /// First poses of the submaps, found and true.
     begun: BTreeMap<u32, (Isometry3<f64>, Isometry3<f64>)>,
     posed: Vec<Posed>,
+    /// Poses that are `OK` with their truths, as they were found.
+    found: Vec<(ScanResult, Isometry3<f64>)>,
+    loops_s: f64,
 }
 
 impl Measurement {
@@ -113,6 +122,7 @@ impl Measurement {
             trial.without_truth += 1;
             return;
         };
+        self.found.push((result.clone(), truth));
         let first = (result.odom_from_base, truth);
         let (odom_first, true_first) = self.begun.entry(result.submap).or_insert(first);
         self.posed.push(Posed {
@@ -126,6 +136,7 @@ impl Measurement {
     /// Registers so many scans of a drive.
     fn drive(&mut self, drive: &Drive, scans: usize) -> Result<(), AnyError> {
         let mut odometry = Odometry::new(OdometryOptions::default());
+        let mut loops = LoopCloser::new();
         for number in drive.scans().take(scans) {
             let scan = drive.scan(number);
             let input = Scan {
@@ -135,8 +146,19 @@ impl Measurement {
             };
             let (result, spent) = timed(|| odometry.register(&input, &Prior::default()));
             self.spend(spent);
-            self.add(Some((result?, Some(drive.pose(scan.end_ns)))));
+            let result = result?;
+            let side_m = odometry.sizes().map_or(f64::NAN, |sizes| sizes.centroids_m);
+            let (closed, spent) = timed(|| {
+                loops
+                    .add(&result, odometry.centroids_m(), side_m)
+                    .map(|_| ())
+            });
+            closed?;
+            self.loops_s += spent.cpu_s;
+            self.add(Some((result, Some(drive.pose(scan.end_ns)))));
         }
+        loops.finish()?;
+        self.trial.loops = LoopTrial::of(&loops, &self.found, Some(self.loops_s));
         Ok(())
     }
 
@@ -273,10 +295,12 @@ fn report_of(lead: &str, trials: &[OdometryTrial]) -> Report {
     }
     let rows = scenes.iter().map(|(scene, trials)| line(scene, trials));
     let columns = "scene|seeds|OK, %|WEAK, %|LOST, %|median ATE, m|largest error, m|median RPE, %|\
-        wrong OK|OK beyond 3 sigma, %|median NEES|median time of a scan, ms|median processor time, ms";
+        wrong OK|OK beyond 3 sigma, %|median NEES|median time of a scan, ms|median processor time, ms|\
+        loops closed|false loops|median ATE with loops, m|processor time of all loops, s";
     let lead = format!(
         "{lead} Errors are those of poses that are OK, since the beginnings of \
-         their submaps; RPE over {SEGMENT_M} m; a pose that is OK and off by more than {WRONG_M} m is wrong."
+         their submaps; RPE over {SEGMENT_M} m; a pose that is OK and off by more than {WRONG_M} m is wrong, \
+         and so is a loop. The ATE with loops is that of all submaps that loops join."
     );
     let section = Section {
         tables: vec![Table::new(
@@ -314,6 +338,10 @@ fn line(scene: &str, trials: &[&OdometryTrial]) -> Vec<Cell> {
         middle(|t| t.nees, 1).into(),
         middle(|t| Some(t.ms), 0).into(),
         middle(|t| Some(t.cpu_ms), 0).into(),
+        (sum(|t| t.loops.closed) as usize).into(),
+        (sum(|t| t.loops.wrong) as usize).into(),
+        middle(|t| t.loops.ate_m, 3).into(),
+        middle(|t| t.loops.cpu_s, 1).into(),
     ]
 }
 

@@ -40,11 +40,15 @@ pub enum DriveScene {
     Blank,
     /// The indoor circuit, without scans for two seconds.
     Gap,
+    /// The circuit of streets, and half of it again.
+    TownAgain,
+    /// The indoor circuit, and half of it again.
+    IndoorAgain,
 }
 
 impl DriveScene {
     /// All scenes.
-    pub const ALL: [DriveScene; 7] = [
+    pub const ALL: [DriveScene; 9] = [
         DriveScene::Town,
         DriveScene::Indoor,
         DriveScene::Corridor,
@@ -52,6 +56,8 @@ impl DriveScene {
         DriveScene::Yard,
         DriveScene::Blank,
         DriveScene::Gap,
+        DriveScene::TownAgain,
+        DriveScene::IndoorAgain,
     ];
 
     /// Name of the scene.
@@ -64,6 +70,8 @@ impl DriveScene {
             DriveScene::Yard => "yard",
             DriveScene::Blank => "blank",
             DriveScene::Gap => "gap",
+            DriveScene::TownAgain => "town_again",
+            DriveScene::IndoorAgain => "indoor_again",
         }
     }
 }

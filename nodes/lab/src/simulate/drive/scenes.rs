@@ -10,6 +10,9 @@ use crate::simulate::town::solid::{Form, Solid};
 /// Class of all solids: odometry has no classes.
 const LABEL: u16 = 0;
 
+/// Rounds of a drive that comes back.
+const AGAIN: f64 = 1.5;
+
 const ROOF: SpinningLidar = SpinningLidar {
     beams: 32,
     shots: 900,
@@ -30,11 +33,13 @@ const ROBOT: SpinningLidar = SpinningLidar {
 pub(super) fn drive(scene: DriveScene, seed: u64) -> Drive {
     let random = &mut Stream::numbered(seed, 3);
     let mut drive = match scene {
-        DriveScene::Town => town(random),
+        DriveScene::Town | DriveScene::TownAgain => town(random),
         DriveScene::Corridor => corridor(random),
         DriveScene::Tunnel => tunnel(random),
         DriveScene::Yard => yard(),
-        DriveScene::Indoor | DriveScene::Blank | DriveScene::Gap => indoor(random),
+        DriveScene::Indoor | DriveScene::IndoorAgain | DriveScene::Blank | DriveScene::Gap => {
+            indoor(random)
+        }
     };
     drive.seed = seed;
     // Anywhere along the way.
@@ -42,6 +47,7 @@ pub(super) fn drive(scene: DriveScene, seed: u64) -> Drive {
     match scene {
         DriveScene::Blank => drive.blank = from..from + 8,
         DriveScene::Gap => drive.missing = from..from + 20,
+        DriveScene::TownAgain | DriveScene::IndoorAgain => drive.route.length_m *= AGAIN,
         _ => {}
     }
     drive
