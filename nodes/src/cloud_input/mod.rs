@@ -212,3 +212,6 @@ fn check_count(points: usize) -> Result<(), CloudInputError> {
         false => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests;

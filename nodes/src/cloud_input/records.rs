@@ -6,7 +6,7 @@ use lattice_msgs::std_msgs::Header;
 use crate::convert::cloud::{dense_cloud, field, xyz_fields};
 
 /// Field of the time of a converted point since the stamp of its cloud, ns (f64).
-pub const TIME_FIELD: &str = "time_offset_ns";
+pub const TIME_FIELD: &str = "since_stamp_ns";
 
 /// Points with the same fields: `x`, `y`, `z` as f32, and further ones.
 pub(super) struct Records {
