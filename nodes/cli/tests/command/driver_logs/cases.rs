@@ -94,11 +94,15 @@ fn lidars() -> Vec<Case> {
 fn scans() -> Vec<Case> {
     vec![
         mcap("rplidar")
-            .says(&["clouds: /scan (30 ", "time of points: field 'since_stamp_ns', in ns"])
+            .says(&[
+                "clouds: /scan (30 ",
+                "time of points: field 'since_stamp_ns', in ns",
+            ])
             .over_dds(),
         sqlite3("sick_scan"),
         mcap("urg_node_echoes").over_dds(),
-        sqlite3("scan_beside_clouds").says(&["not taken: /scan (of velodyne as /velodyne_points; "]),
+        sqlite3("scan_beside_clouds")
+            .says(&["not taken: /scan (of velodyne as /velodyne_points; "]),
         mcap("livox_ros_driver2").over_dds(),
         sqlite3("livox_ros_driver"),
         mcap("livox_interfaces"),
@@ -243,7 +247,10 @@ fn faults() -> Vec<Case> {
             ])
             .over_dds(),
         sqlite3("lidar_on_body").with(&["-p", "base_frame:=body"]),
-        mcap("no_clouds").refused(&["sensor_msgs/msg/LaserScan", "/range (sensor_msgs/msg/Range)"]),
+        mcap("no_clouds").refused(&[
+            "sensor_msgs/msg/LaserScan",
+            "/range (sensor_msgs/msg/Range)",
+        ]),
         sqlite3("empty_clouds").refused(&["nothing was mapped: 0 points in 30 clouds"]),
         mcap("clouds_before_and_after_poses").over_dds(),
         sqlite3("sparse_poses").refused(&["max_pose_gap_s"]),
