@@ -33,7 +33,7 @@ struct Echo {
 /// Cloud of a scan: point i is that of ray i.
 ///
 /// The fields are x, y, z, `intensity` if there is one for each ray, and [`TIME_FIELD`] unless `time_increment` is 0.
-/// `scan_time` is the time between scans. It does not tell when a ray was measured, since nodes that make scans of depth
+/// `scan_time` is the time between scans, not that of their rays: nodes that make scans of depth
 /// images and clouds set it too.
 pub fn cloud_of_scan(scan: &LaserScan) -> Result<PointCloud2, CloudInputError> {
     let rays = Rays::new(

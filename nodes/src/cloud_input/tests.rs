@@ -134,18 +134,18 @@ fn options_for_the_times_of_other_clouds_leave_those_of_scans() {
 
 #[test]
 fn angles_and_times_that_are_no_numbers_are_refused_by_name() {
-    let change: [(&str, fn(&mut LaserScan)); 3] = [
-        ("`angle_min` is inf", |scan| scan.angle_min = f32::INFINITY),
-        ("`angle_increment` is NaN", |scan| {
-            scan.angle_increment = f32::NAN
-        }),
-        ("`time_increment` is -inf", |scan| {
-            scan.time_increment = f32::NEG_INFINITY
-        }),
-    ];
-    for (text, change) in change {
-        let mut message = scan(vec![1.0]);
-        change(&mut message);
+    let of = |angle_min, angle_increment, time_increment| LaserScan {
+        angle_min,
+        angle_increment,
+        time_increment,
+        ..scan(vec![1.0])
+    };
+    let (inf, nan) = (f32::INFINITY, f32::NAN);
+    for (text, message) in [
+        ("`angle_min` is inf", of(inf, 0.1, 0.0)),
+        ("`angle_increment` is NaN", of(0.0, nan, 0.0)),
+        ("`time_increment` is -inf", of(0.0, 0.1, -inf)),
+    ] {
         let error = cloud_of_scan(&message).unwrap_err().to_string();
         assert!(error.contains(text), "{error}");
     }

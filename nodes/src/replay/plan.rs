@@ -306,6 +306,7 @@ fn find_cloud(bag: &BagReader, name: &str) -> Result<usize, TopicError> {
             name: name.to_owned(),
             types: type_names(),
             has: listing(bag),
+            remedy: packets::remedy(bag),
         })
 }
 

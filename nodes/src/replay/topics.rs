@@ -29,7 +29,7 @@ pub enum TopicError {
         has: String,
     },
     /// A topic of clouds that was asked for.
-    #[error("no topic '{name}' of clouds in the log ({types}); it has {has}")]
+    #[error("no topic '{name}' of clouds in the log ({types}); it has {has}{remedy}")]
     MissingClouds {
         /// Asked for.
         name: String,
@@ -37,6 +37,8 @@ pub enum TopicError {
         types: String,
         /// Topics of the log.
         has: String,
+        /// Command that makes clouds of what it has; may be empty.
+        remedy: String,
     },
     /// Nothing to map.
     #[error("no topic of clouds in the log ({types}); it has {has}{remedy}")]

@@ -25,7 +25,7 @@ const RAYS: usize = 5;
 const SPEED: f64 = 10.0;
 const TOPICS: [&str; 3] = ["left/scan", "right/scan", "top/scan"];
 
-/// A scan of the scanner of a number: its range tells which one it is.
+/// A scan of the scanner of a number, by which its range differs.
 fn scan(scanner: usize, stamp_ns: i64) -> LaserScan {
     let mut ranges = vec![range_m(scanner) as f32; RAYS];
     ranges[1] = f32::INFINITY;

@@ -114,7 +114,7 @@ fn scans() -> Vec<Case> {
         ]),
         sqlite3("velodyne_packets").refused(&[
             "/velodyne_packets has raw packets",
-            "ros2 run velodyne_pointcloud velodyne_transform_node",
+            "ros2 launch velodyne_pointcloud velodyne_transform_node-VLP16-launch.py",
         ]),
     ]
 }
