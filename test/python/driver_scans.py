@@ -22,10 +22,11 @@ def ranges_of(scan):
     return numpy.where(scan.returned[:, 0], ranges, missing).astype("f4")
 
 
-def laser(log, topic, message, mount, sign):
+def laser(log, topic, message, mount, sign, poses=True):
     """Scans of a type on the usual robot; `message` makes one of its ranges and the common fields."""
     log.tf_static(("base_link", "laser", mount))
-    filtered(log)
+    if poses:
+        filtered(log)
     log.mapped = planar_drive()
     step = 2 * numpy.pi / COLUMNS
     for scan in log.mapped:
@@ -59,6 +60,19 @@ def rplidar(log):
 @register
 def sick_scan(log):
     laser(log, "/front/scan", laser_scan, UPSIDE_DOWN, 1)
+
+
+@register
+def scan_alone(log):
+    laser(log, "/scan", laser_scan, UPRIGHT, -1, poses=False)
+
+
+@register
+def scan_with_other_lidar(log):
+    # A planar laser and a lidar in frames of their own: both are mapped.
+    laser(log, "/scan", laser_scan, UPRIGHT, -1)
+    velodyne(log)
+    log.mapped = log.mapped + log.scans
 
 
 @register

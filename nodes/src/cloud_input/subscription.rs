@@ -1,14 +1,17 @@
 //! Subscriptions to clouds, each of the type that is published on its topic.
 
+use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::sensor_msgs::{LaserScan, MultiEchoLaserScan, PointCloud, PointCloud2};
 use lattice_msgs::{livox_interfaces, livox_ros_driver, livox_ros_driver2};
+use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    Losses, Node, Runtime, RuntimeError, Subscription, SubscriptionExecutor, Timer, lock,
+    Losses, Node, RemotePublisher, Runtime, RuntimeError, Subscription, SubscriptionExecutor,
+    Timer, lock,
 };
 
 use super::{
@@ -19,6 +22,12 @@ use crate::start::NodeError;
 
 /// Period of checks of the published types.
 const PERIOD: Duration = Duration::from_millis(200);
+/// Time allowed for a publisher to appear.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// Limit of changes of the type of a topic.
+const MAX_CHANGES: u32 = 100;
+/// Limit of other topics named in a warning.
+const MAX_NAMED: usize = 8;
 
 /// A cloud, or the reason for which a message was not converted.
 pub type Converted = Result<Arc<PointCloud2>, CloudInputError>;
@@ -65,6 +74,11 @@ struct Input {
     cloud_type: CloudType,
     /// `None` while the type is changed.
     subscription: Option<Subscription>,
+    changes: u32,
+    began: Instant,
+    /// True once topics of other types were named.
+    is_named: bool,
+    warnings: Throttle,
 }
 
 impl CloudSubscriptions {
@@ -114,6 +128,10 @@ impl Inputs {
             name,
             cloud_type,
             subscription: Some(subscription),
+            changes: 0,
+            began: Instant::now(),
+            is_named: false,
+            warnings: Throttle::new(Duration::from_secs(5)),
         });
         Ok(())
     }
@@ -129,19 +147,27 @@ impl Inputs {
             let here = publishers.iter().filter(|of| of.topic == input.resolved);
             let types: Vec<_> = here.filter_map(|of| CloudType::of(&of.type_name)).collect();
             let is_published = types.contains(&input.cloud_type);
-            if let (Some(other), false) = (types.into_iter().min(), is_published) {
+            if let (Some(other), false) = (types.into_iter().min(), is_published)
+                && input.changes < MAX_CHANGES
+            {
                 log::info!("{}: published as {}", input.resolved, other.name());
                 input.cloud_type = other;
                 input.subscription = None;
+                input.changes += 1;
             }
             if input.subscription.is_some() {
+                input.name_others(&publishers, self.parameter);
                 continue;
             }
             match self.subscribe(&input.name, input.cloud_type) {
                 Ok(subscription) => input.subscription = Some(subscription),
                 // Until the subscription before has ended.
                 Err(RuntimeError::TypeMismatch { .. }) => {}
-                Err(error) => log::warn!("{}: not subscribed: {error}", input.resolved),
+                Err(error) => {
+                    if input.warnings.check().is_some() {
+                        log::warn!("{}: not subscribed: {error}", input.resolved);
+                    }
+                }
             }
         }
         self.inputs = inputs;
@@ -202,6 +228,37 @@ impl Input {
         let subscription = self.subscription.as_ref();
         subscription.is_none_or(|subscription| subscription.publisher_count() == 0)
     }
+
+    /// Warns once of topics of other types than PointCloud2, which are named elsewhere.
+    fn name_others(&mut self, publishers: &[RemotePublisher], parameter: Option<&str>) {
+        if self.is_named || self.began.elapsed() < PATIENCE {
+            return;
+        }
+        let others = publishers.iter().filter(|of| {
+            let cloud_type = CloudType::of(&of.type_name);
+            cloud_type.is_some_and(|other| other != CloudType::PointCloud2)
+        });
+        let others: BTreeSet<String> = others
+            .filter(|of| of.topic != self.resolved && of.topic.chars().all(is_of_name))
+            .map(|of| format!("{} ({})", of.topic, of.type_name))
+            .collect();
+        if others.is_empty() {
+            return;
+        }
+        self.is_named = true;
+        let named: Vec<String> = others.into_iter().take(MAX_NAMED).collect();
+        let set = parameter.map_or(String::new(), |parameter| format!(", or set {parameter}"));
+        log::warn!(
+            "no publisher on {}; of other types of clouds there are: {}; remap with -r {}:=TOPIC{set}",
+            self.resolved,
+            named.join(", "),
+            self.name
+        );
+    }
+}
+
+fn is_of_name(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '_' || c == '/'
 }
 
 fn converted(cloud: Result<PointCloud2, CloudInputError>) -> Converted {

@@ -72,6 +72,17 @@ impl TopicPlan {
         topics.filter_map(|(i, _)| bag.topics().get(*i))
     }
 
+    /// Line for lidar odometry on scans in one plane.
+    fn planar_odometry(&self, bag: &BagReader) -> Option<String> {
+        let topic = self.odometry?;
+        let is_planar = |role: &Role| matches!(role, Role::Cloud(of) if of.is_planar());
+        self.roles.get(&topic).filter(|role| is_planar(role))?;
+        let name = bag.topics().get(topic).map(|topic| &topic.name)?;
+        Some(format!(
+            "{name} is of a planar scanner, which shows no height, roll or pitch: record odometry or /tf beside it"
+        ))
+    }
+
     /// Names of the topics with a role that is wanted.
     pub(super) fn names(&self, bag: &BagReader, wanted: impl Fn(Role) -> bool) -> Vec<String> {
         let topics = self.topics(bag, wanted);
@@ -136,6 +147,7 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
     let of_ins = plan.names(bag, |role| matches!(role, Role::Ins(_)));
     plan.pose_delay_ns = disorder::delay_ns(bag, of_ins)?;
     plan.choices = said(bag, &plan);
+    plan.choices.extend(plan.planar_odometry(bag));
     plan.choices.extend(log.choices);
     let late = LateStatics::read(bag, &plan)?;
     plan.choices.extend(late.lines);

@@ -101,6 +101,13 @@ fn scans() -> Vec<Case> {
             .over_dds(),
         sqlite3("sick_scan"),
         mcap("urg_node_echoes").over_dds(),
+        mcap("scan_alone").refused(&[
+            "lidar odometry on /scan",
+            "/scan is of a planar scanner",
+            "all scans of /scan are lost",
+        ]),
+        mcap("scan_with_other_lidar")
+            .says(&["clouds: /scan (30 messages), /velodyne_points (30 messages)"]),
         sqlite3("scan_beside_clouds")
             .says(&["not taken: /scan (of velodyne as /velodyne_points; "]),
         mcap("livox_ros_driver2").over_dds(),
