@@ -1,10 +1,12 @@
-//! Scans of three lasers, 5 ms apart, to clouds in the map, and a driver that changes its type.
+//! Scans of three lasers, 5 ms apart, to clouds in the map; a driver that changes its type; odometry of a Livox.
 
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
+use lattice_lab::simulate::drive::{Drive, DriveScan, DriveScene};
+use lattice_msgs::livox_interfaces::{CustomMsg, CustomPoint};
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::sensor_msgs::{LaserScan, PointCloud2};
 use lattice_runtime::qos::Qos;
@@ -176,5 +178,70 @@ fn scans_of_three_lasers_are_mapped_ray_by_ray_and_a_driver_may_change_its_type(
     let found = points(&next(&mapped, stamp_ns));
     let expected = nalgebra::Vector3::new(place_m(stamp_ns) + 1.0, 2.0, 3.0);
     assert!((found[0] - expected).norm() < 1e-5, "{found:?}");
+    nodes.finish();
+}
+
+/// A scan as the driver of a Livox publishes it.
+fn livox(scan: &DriveScan, first_ns: i64) -> CustomMsg {
+    let points = scan.points_m.iter().zip(&scan.times_ns);
+    let points = points.map(|(p, time_ns)| CustomPoint {
+        offset_time: (time_ns - first_ns) as u32,
+        x: p.x as f32,
+        y: p.y as f32,
+        z: p.z as f32,
+        ..CustomPoint::default()
+    });
+    CustomMsg {
+        header: header("livox_frame", START_NS + first_ns),
+        points: points.collect(),
+        ..CustomMsg::default()
+    }
+}
+
+#[test]
+fn points_of_a_livox_become_odometry() {
+    let domain = TestDomain::take();
+    let nodes = Nodes::start(
+        &domain,
+        &[("lidar_odometry", params("base_frame:=livox_frame"))],
+    );
+    let runtime = Runtime::with_transport("driver", RosArgs::default(), &domain.transport());
+    let runtime = runtime.unwrap();
+    let node = runtime.node("driver").unwrap();
+    let (sender, found) = channel::<Arc<Odometry>>();
+    let handler = move |pose| drop(sender.send(pose));
+    let shared = SubscriptionExecutor::Shared;
+    let odometry = node.subscribe("odometry", Qos::DEFAULT, shared, handler);
+    let odometry = odometry.unwrap();
+    let points = node.publisher::<CustomMsg>("points", Qos::reliable(5));
+    let points = points.unwrap();
+    wait_for(&points);
+    let begin = Instant::now();
+    while odometry.publisher_count() == 0 {
+        assert!(begin.elapsed() < PATIENCE, "no odometry");
+        std::thread::yield_now();
+    }
+    let drive = Drive::new(DriveScene::Indoor, 1);
+    let mut start = None;
+    for number in drive.scans().skip(30).take(12) {
+        let scan = drive.scan(number);
+        let first_ns = scan.times_ns.iter().copied().min().unwrap();
+        let begin = Instant::now();
+        let pose = loop {
+            assert!(begin.elapsed() < PATIENCE, "no pose of scan {number}");
+            // Again until it is taken: the first ones may come before the subscription of the test.
+            points.publish(livox(&scan, first_ns)).unwrap();
+            match found.recv_timeout(Duration::from_millis(500)) {
+                Ok(pose) if pose.header.stamp.to_ns() == START_NS + scan.end_ns => break pose,
+                _ => {}
+            }
+        };
+        let truth = drive.pose(scan.end_ns);
+        let truth = start.get_or_insert(truth).inverse() * truth;
+        let at = &pose.pose.pose.position;
+        let at = nalgebra::Vector3::new(at.x, at.y, at.z);
+        let error_m = (truth.translation.vector - at).norm();
+        assert!(error_m < 0.05, "scan {number}: {error_m} m");
+    }
     nodes.finish();
 }
