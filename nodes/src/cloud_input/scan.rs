@@ -57,9 +57,9 @@ pub fn cloud_of_echoes(scan: &MultiEchoLaserScan) -> Result<PointCloud2, CloudIn
         [scan.range_min, scan.range_max],
     )?;
     let (ranges, intensities) = (&scan.ranges, &scan.intensities);
-    let lengths = |of: &[LaserEcho]| -> Vec<usize> { of.iter().map(|e| e.echoes.len()).collect() };
-    let count = lengths(ranges).into_iter().fold(0, usize::saturating_add);
-    let has_intensity = count > 0 && lengths(ranges) == lengths(intensities);
+    let length = |of: &LaserEcho| of.echoes.len();
+    let count = ranges.iter().map(length).fold(0, usize::saturating_add);
+    let has_intensity = count > 0 && ranges.iter().map(length).eq(intensities.iter().map(length));
     let echoes = ranges.iter().enumerate().flat_map(|(ray, echoes)| {
         let intensities = intensities.get(ray);
         echoes

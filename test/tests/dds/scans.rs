@@ -1,5 +1,6 @@
 //! Scans of three lasers, 5 ms apart, to clouds in the map; a driver that changes its type; odometry of a Livox.
 
+use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -47,6 +48,11 @@ fn scan(scanner: usize, stamp_ns: i64) -> LaserScan {
 
 fn range_m(scanner: usize) -> f64 {
     5.0 + scanner as f64
+}
+
+/// Scanner of a cloud by its last ray, at +90 degrees.
+fn scanner_of(cloud: &PointCloud2) -> usize {
+    (points(cloud).last().unwrap().y - 5.0).round() as usize
 }
 
 /// Position of the machine, m.
@@ -136,15 +142,21 @@ fn scans_of_three_lasers_are_mapped_ray_by_ray_and_a_driver_may_change_its_type(
     wait_for(&poses);
     scans.iter().for_each(wait_for);
 
-    // Until the transformer and the listener know each other.
+    // Until the transformer has a scan of each laser, and the listener knows it.
     let begin = Instant::now();
     let mut begin_ns = START_NS;
-    while mapped.recv_timeout(Duration::from_millis(50)).is_err() {
-        assert!(begin.elapsed() < PATIENCE, "no scan is mapped");
+    let mut known = BTreeSet::new();
+    while known.len() < TOPICS.len() {
+        assert!(begin.elapsed() < PATIENCE, "scans of {known:?} are mapped");
         pose(&poses, begin_ns);
-        scans[0].publish(scan(0, begin_ns)).unwrap();
+        for (scanner, publisher) in scans.iter().enumerate() {
+            publisher.publish(scan(scanner, begin_ns)).unwrap();
+        }
         begin_ns += PERIOD_NS;
         pose(&poses, begin_ns);
+        while let Ok(cloud) = mapped.recv_timeout(Duration::from_millis(50)) {
+            known.insert(scanner_of(&cloud));
+        }
     }
     for step in 0..SCANS {
         let stamp_ns = begin_ns + step * PERIOD_NS;
@@ -155,9 +167,7 @@ fn scans_of_three_lasers_are_mapped_ray_by_ray_and_a_driver_may_change_its_type(
         let mut scanners = Vec::new();
         for _ in TOPICS {
             let cloud = next(&mapped, stamp_ns);
-            // The last ray is at +90 degrees.
-            let range_m = points(&cloud).last().unwrap().y;
-            let scanner = (range_m - 5.0).round() as usize;
+            let scanner = scanner_of(&cloud);
             let error_m = error_m(&cloud, scanner);
             assert!(error_m < 1e-5, "scan {step} of {scanner}: {error_m} m");
             scanners.push(scanner);
@@ -172,10 +182,16 @@ fn scans_of_three_lasers_are_mapped_ray_by_ray_and_a_driver_may_change_its_type(
     let clouds = driver.publisher::<PointCloud2>(TOPICS[0], qos).unwrap();
     wait_for(&clouds);
     let stamp_ns = begin_ns + SCANS * PERIOD_NS;
-    clouds
-        .publish(cloud("base_link", stamp_ns, &[[1.0, 2.0, 3.0]]))
-        .unwrap();
-    let found = points(&next(&mapped, stamp_ns));
+    let begin = Instant::now();
+    let found = loop {
+        assert!(begin.elapsed() < PATIENCE, "no cloud is mapped");
+        let message = cloud("base_link", stamp_ns, &[[1.0, 2.0, 3.0]]);
+        clouds.publish(message).unwrap();
+        match mapped.recv_timeout(Duration::from_millis(500)) {
+            Ok(cloud) if cloud.header.stamp.to_ns() == stamp_ns => break points(&cloud),
+            _ => {}
+        }
+    };
     let expected = nalgebra::Vector3::new(place_m(stamp_ns) + 1.0, 2.0, 3.0);
     assert!((found[0] - expected).norm() < 1e-5, "{found:?}");
     nodes.finish();
