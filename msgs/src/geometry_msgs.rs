@@ -9,6 +9,7 @@ use crate::std_msgs::Header;
 messages! {
     "geometry_msgs" in "../definitions/geometry_msgs/";
     Point [];
+    Point32 [];
     Vector3 [];
     Quaternion [];
     Pose [Point, Quaternion];
@@ -30,6 +31,17 @@ pub struct Point {
     pub y: f64,
     /// Along z.
     pub z: f64,
+}
+
+/// A position of single precision, m.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Point32 {
+    /// Along x.
+    pub x: f32,
+    /// Along y.
+    pub y: f32,
+    /// Along z.
+    pub z: f32,
 }
 
 /// A free vector; its unit is that of the field it stands in.

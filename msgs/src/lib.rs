@@ -39,6 +39,7 @@ pub mod headset;
 mod interface;
 pub mod lattice;
 pub mod lifecycle_msgs;
+mod livox;
 pub mod nav_msgs;
 pub mod novatel_oem7_msgs;
 pub mod octomap_msgs;
@@ -60,5 +61,6 @@ pub mod visualization_msgs;
 
 pub use action::RosAction;
 pub use interface::{RosMessage, RosService, Schema, dds_type_name};
+pub use livox::{livox_interfaces, livox_ros_driver, livox_ros_driver2};
 pub use registry::{MessageVisitor, definition_of, visit_messages};
 pub use type_hash::{hash_of, schema_of, type_description, type_hash};

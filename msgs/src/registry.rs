@@ -3,10 +3,10 @@
 use crate::interface::RosMessage;
 use crate::{
     action, action_msgs, builtin_interfaces, calibration, diagnostic_msgs, geographic_msgs,
-    geometry_msgs, headset, lattice, lifecycle_msgs, nav_msgs, novatel_oem7_msgs, octomap_msgs,
-    rcl_interfaces, rmw_dds_common, rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs,
-    std_srvs, tf2_msgs, type_description_interfaces, unique_identifier_msgs, vision_msgs,
-    visualization_msgs,
+    geometry_msgs, headset, lattice, lifecycle_msgs, livox_interfaces, livox_ros_driver,
+    livox_ros_driver2, nav_msgs, novatel_oem7_msgs, octomap_msgs, rcl_interfaces, rmw_dds_common,
+    rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs, tf2_msgs,
+    type_description_interfaces, unique_identifier_msgs, vision_msgs, visualization_msgs,
 };
 
 /// Visitor of every message type; see [`visit_messages`].
@@ -31,6 +31,9 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     lattice::visit_services(visitor);
     lifecycle_msgs::visit_messages(visitor);
     lifecycle_msgs::visit_services(visitor);
+    livox_interfaces::visit_messages(visitor);
+    livox_ros_driver::visit_messages(visitor);
+    livox_ros_driver2::visit_messages(visitor);
     nav_msgs::visit_messages(visitor);
     novatel_oem7_msgs::visit_messages(visitor);
     octomap_msgs::visit_services(visitor);

@@ -1,9 +1,9 @@
-//! Point clouds, images, inertial and satellite measurements.
+//! Point clouds, laser scans, images, inertial and satellite measurements.
 
 use serde::{Deserialize, Serialize};
 use serde_bytes::ByteBuf;
 
-use crate::geometry_msgs::{Quaternion, Vector3};
+use crate::geometry_msgs::{Point32, Quaternion, Vector3};
 use crate::interface::messages;
 use crate::std_msgs::Header;
 
@@ -11,6 +11,11 @@ messages! {
     "sensor_msgs" in "../definitions/sensor_msgs/";
     PointField [];
     PointCloud2 [Header, PointField];
+    ChannelFloat32 [];
+    PointCloud [Header, Point32, ChannelFloat32];
+    LaserScan [Header];
+    LaserEcho [];
+    MultiEchoLaserScan [Header, LaserEcho];
     Image [Header];
     CompressedImage [Header];
     RegionOfInterest [];
@@ -73,6 +78,83 @@ pub struct PointCloud2 {
     pub data: ByteBuf,
     /// True: no point has an invalid (NaN) coordinate.
     pub is_dense: bool,
+}
+
+/// One value for each point of a PointCloud.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ChannelFloat32 {
+    /// Such as intensity, rgb.
+    pub name: String,
+    /// As many as points.
+    pub values: Vec<f32>,
+}
+
+/// Points with named values, replaced by PointCloud2.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PointCloud {
+    /// Time of acquisition, and frame of the coordinates.
+    pub header: Header,
+    /// In m.
+    pub points: Vec<Point32>,
+    /// Further values.
+    pub channels: Vec<ChannelFloat32>,
+}
+
+/// One turn of a planar laser, in the plane z = 0 of its frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LaserScan {
+    /// Time of the first ray, and frame of the scanner: angles about z, 0 along x.
+    pub header: Header,
+    /// Angle of the first ray, rad.
+    pub angle_min: f32,
+    /// Angle of the last ray, rad.
+    pub angle_max: f32,
+    /// Angle from ray to ray, rad; negative: clockwise.
+    pub angle_increment: f32,
+    /// Time from ray to ray, s; 0: all at once.
+    pub time_increment: f32,
+    /// Time from scan to scan, s.
+    pub scan_time: f32,
+    /// Least valid range, m.
+    pub range_min: f32,
+    /// Greatest valid range, m.
+    pub range_max: f32,
+    /// Range of each ray, m (REP 117: infinite no return, minus infinite too near, NaN invalid).
+    pub ranges: Vec<f32>,
+    /// Of each ray, in units of the scanner; may be empty.
+    pub intensities: Vec<f32>,
+}
+
+/// Echoes of one ray.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LaserEcho {
+    /// Ranges in m, or intensities; may be empty.
+    pub echoes: Vec<f32>,
+}
+
+/// One turn of a planar laser with any number of echoes for each ray, in the plane z = 0 of its frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MultiEchoLaserScan {
+    /// Time of the first ray, and frame of the scanner: angles about z, 0 along x.
+    pub header: Header,
+    /// Angle of the first ray, rad.
+    pub angle_min: f32,
+    /// Angle of the last ray, rad.
+    pub angle_max: f32,
+    /// Angle from ray to ray, rad; negative: clockwise.
+    pub angle_increment: f32,
+    /// Time from ray to ray, s; 0: all at once.
+    pub time_increment: f32,
+    /// Time from scan to scan, s.
+    pub scan_time: f32,
+    /// Least valid range, m.
+    pub range_min: f32,
+    /// Greatest valid range, m.
+    pub range_max: f32,
+    /// Ranges of each ray, m (REP 117: infinite no return, minus infinite too near, NaN invalid).
+    pub ranges: Vec<LaserEcho>,
+    /// Of each echo, in units of the scanner; may be empty.
+    pub intensities: Vec<LaserEcho>,
 }
 
 /// An image without compression.

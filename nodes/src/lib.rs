@@ -6,6 +6,7 @@ pub mod bag_player;
 #[cfg(feature = "bags")]
 pub mod bag_recorder;
 pub mod camera;
+pub mod cloud_input;
 pub mod compute;
 pub mod convert;
 pub mod enu_transformer;

@@ -19,17 +19,6 @@ def lidar_and_imu(log):
 
 
 @register
-def livox_own_messages(log):
-    # livox_ros_driver2 with xfer_format 1.
-    filtered(log)
-    for scan in log.scans:
-        message = make(
-            "livox_ros_driver2/msg/CustomMsg", header=header("livox_frame", scan.stamp_ns)
-        )
-        log.add("/livox/lidar", scan.stamp_ns, message)
-
-
-@register
 def gazebo_scoped_frame(log):
     log.clouds("/points", "x500/lidar_link/gpu_lidar", OAKD, LIDAR)
     log.tf_static(("base_link", "lidar_link", LIDAR))
@@ -53,7 +42,7 @@ def lidar_on_body(log):
 def no_clouds(log):
     filtered(log)
     for at_ns in log.times(10):
-        log.add("/scan", at_ns, make("sensor_msgs/msg/LaserScan", header=header("laser", at_ns)))
+        log.add("/range", at_ns, make("sensor_msgs/msg/Range", header=header("sonar", at_ns)))
 
 
 @register

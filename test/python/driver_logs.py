@@ -16,6 +16,7 @@ import driver_faults  # noqa: F401
 import driver_lidars  # noqa: F401
 import driver_oddities  # noqa: F401
 import driver_positioning  # noqa: F401
+import driver_scans  # noqa: F401
 from driver_recording import Recording
 from driver_robot import LOGS
 

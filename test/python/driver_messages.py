@@ -16,13 +16,24 @@ LIVOX = {
 }
 
 
+LIVOX_PACKAGES = ["livox_ros_driver2", "livox_ros_driver", "livox_interfaces"]
+# Raw packets, whose layout is of no concern.
+PACKETS = {
+    "ouster_sensor_msgs/msg/PacketMsg": "uint8[] buf\n",
+    "velodyne_msgs/msg/VelodynePacket": "builtin_interfaces/Time stamp\nuint8[1206] data\n",
+    "velodyne_msgs/msg/VelodyneScan": "std_msgs/Header header\nVelodynePacket[] packets\n",
+}
+
+
 def store_with_drivers():
-    """Types of ROS 2 Jazzy and of the drivers of NovAtel and Livox."""
+    """Types of ROS 2 Jazzy and of the drivers of NovAtel, Livox, Ouster and Velodyne."""
     store = get_typestore(Stores.ROS2_JAZZY)
     texts = {
         f"novatel_oem7_msgs/msg/{path.stem}": path.read_text() for path in DEFINITIONS.glob("*")
     }
-    texts |= {f"livox_ros_driver2/msg/{name}": text for name, text in LIVOX.items()}
+    for package in LIVOX_PACKAGES:
+        texts |= {f"{package}/msg/{name}": text for name, text in LIVOX.items()}
+    texts |= PACKETS
     for name, text in texts.items():
         store.register(get_types_from_msg(text, name))
     return store

@@ -138,13 +138,13 @@ def ranges(origins, directions):
 class Scan:
     """One sweep: columns a millisecond apart, each seen from where the machine was then."""
 
-    def __init__(self, number):
+    def __init__(self, number, elevations=numpy.radians(numpy.linspace(-22, 14, ROWS))):
         self.stamp_ns = START_NS + number * SCAN_NS
         self.column_ns = self.stamp_ns + numpy.arange(COLUMNS) * (SCAN_NS // COLUMNS)
         self.poses = numpy.array([pose(int(at_ns)) for at_ns in self.column_ns])
         azimuth, elevation = numpy.meshgrid(
             -2 * numpy.pi * (numpy.arange(COLUMNS) + 0.13) / COLUMNS,
-            numpy.radians(numpy.linspace(-22, 14, ROWS)),
+            elevations,
             indexing="ij",
         )
         level = numpy.cos(elevation)
@@ -153,16 +153,17 @@ class Scan:
         )
         directions = numpy.einsum("cij,crj->cri", self.poses[:, :3, :3], rays).reshape(-1, 3)
         laser = self.poses[:, :3, 3] + self.poses[:, :3, 2] * LASER_M
-        origins = numpy.repeat(laser, ROWS, axis=0)
+        rows = len(elevations)
+        origins = numpy.repeat(laser, rows, axis=0)
         found = ranges(origins, directions)
         returned = numpy.isfinite(found)
         points = origins + numpy.where(returned, found, 0)[:, None] * directions
         self.cells, near = nearest(GENERATOR, points, BORDER_M)
         returned[list(near)] = False
         # By column and row.
-        self.world_m = points.reshape(COLUMNS, ROWS, 3)
-        self.returned = returned.reshape(COLUMNS, ROWS)
-        self.cells = self.cells.reshape(COLUMNS, ROWS, 3)
+        self.world_m = points.reshape(COLUMNS, rows, 3)
+        self.returned = returned.reshape(COLUMNS, rows)
+        self.cells = self.cells.reshape(COLUMNS, rows, 3)
 
     def seen_from(self, base_from_sensor, stamp_ns=None):
         """Points in the axes of a sensor at their own times, or all at one time."""
@@ -175,6 +176,12 @@ class Scan:
 def drive():
     """All scans."""
     return [Scan(number) for number in SCANS]
+
+
+@functools.cache
+def planar_drive():
+    """All scans of a planar laser."""
+    return [Scan(number, numpy.zeros(1)) for number in SCANS]
 
 
 def map_of(scans, begins_at_m=(0.0, 0.0, 0.0)):

@@ -4,6 +4,7 @@ use lattice_core::cloud::{CloudError, CloudLimits, NO_TIME_NS, TimeOptions};
 use lattice_msgs::sensor_msgs::PointCloud2;
 
 use super::cloud_notes::CloudNotes;
+use crate::cloud_input;
 use crate::convert::cloud;
 
 /// Times of the points of a cloud whose layout has been checked.
@@ -32,7 +33,8 @@ impl CloudTimes {
         let view = layout.view(&message.data, &CloudLimits { max_points })?;
         let times_ns = match time {
             Some(time) => {
-                let found = view.point_times(stamp_ns, time)?;
+                let time = cloud_input::time_options(message, time);
+                let found = view.point_times(stamp_ns, &time)?;
                 notes.on_times(topic, stamp_ns, &found.source);
                 found.times_ns
             }

@@ -5,10 +5,12 @@ use lattice_core::pose::{PoseMiss, TfMiss};
 
 use super::EnuTransformer;
 use super::ins::InsSource;
+use crate::cloud_input::CloudInputError;
 
 /// Reason for dropping a cloud.
 pub(super) enum Drop {
     Malformed(CloudError),
+    Unconverted(CloudInputError),
     BeforePoses {
         by_ns: i64,
     },
@@ -37,7 +39,9 @@ impl EnuTransformer {
     pub(super) fn drop_cloud(&mut self, topic: &str, reason: &Drop) {
         let counts = &mut self.counts;
         let (counter, name) = match reason {
-            Drop::Malformed(_) => (&mut counts.clouds_malformed, "clouds_malformed"),
+            Drop::Malformed(_) | Drop::Unconverted(_) => {
+                (&mut counts.clouds_malformed, "clouds_malformed")
+            }
             Drop::BeforePoses { .. } => (&mut counts.clouds_before_poses, "clouds_before_poses"),
             Drop::PoseGap(_) => (&mut counts.clouds_pose_gap, "clouds_pose_gap"),
             Drop::PoseLate(_) => (&mut counts.clouds_pose_late, "clouds_pose_late"),
@@ -62,6 +66,7 @@ impl EnuTransformer {
         let no_poses = self.counts.poses_in == 0;
         match reason {
             Drop::Malformed(error) => error.to_string(),
+            Drop::Unconverted(error) => error.to_string(),
             Drop::BeforePoses { by_ns } => {
                 format!("{:.3} s before the first pose", seconds(*by_ns))
             }

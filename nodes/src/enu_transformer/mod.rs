@@ -54,6 +54,7 @@ use self::pose_frames::{Reference, WaitingPose};
 use self::speed_gate::SpeedGate;
 use self::verdict::Verdict;
 use self::waiting::{Waiting, WaitingCloud};
+use crate::cloud_input::CloudInputError;
 use crate::convert::cloud;
 
 /// A step back of the receiving clock by more than this is a log that loops.
@@ -216,6 +217,12 @@ impl EnuTransformer {
             Err(error) => self.drop_cloud(topic, &Drop::Malformed(error)),
         }
         out
+    }
+
+    /// Counts a cloud of a topic that was not converted.
+    pub fn on_unconverted(&mut self, topic: &str, error: &CloudInputError) {
+        self.counts.clouds_in += 1;
+        self.drop_cloud(topic, &Drop::Unconverted(error.clone()));
     }
 
     /// Counts a message of a topic that did not decode.

@@ -15,8 +15,8 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use super::ins::{InsMessage, InsSource};
 use super::parameters::Settings;
 use super::{EnuOutput, EnuTransformer, TransformerOptions, TransformerReport, most_frequent};
+use crate::cloud_input::{CloudSubscriptions, Converted, SubscribedClouds, bytes_of};
 use crate::compute::{Compute, Inbox};
-use crate::convert::cloud;
 use crate::report;
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
@@ -28,7 +28,7 @@ use lattice_runtime::{
 
 /// Event for the compute thread.
 enum Event {
-    Cloud(Arc<str>, Arc<PointCloud2>),
+    Cloud(Arc<str>, Converted),
     Transforms(Arc<TFMessage>, bool),
     Inspva(Arc<INSPVA>),
     Inspvax(Arc<INSPVAX>),
@@ -74,7 +74,6 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         move |event| compute_state.on(event),
     )?;
     let inbox = compute.inbox();
-    let mut clouds = Vec::new();
     let poses = PoseInbox {
         inbox: inbox.clone(),
         lost: lost_poses,
@@ -86,26 +85,19 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let of_ins = Some("ins.source and ins.topic");
     node.expect_publishers(&inputs, "the driver of the INS", of_ins, |_| true);
     inputs.extend(transforms);
-    for topic in settings.points_topics {
-        let name: Arc<str> = topic.as_str().into();
-        let event = move |cloud| Event::Cloud(Arc::clone(&name), cloud);
-        let hand_over = inbox.counting(&lost, event, |cloud| cloud::bytes_of(cloud));
-        clouds.push(node.subscribe(
-            &topic,
-            Qos::SCANS,
-            SubscriptionExecutor::Dedicated,
-            hand_over,
-        )?);
-    }
-    lost_clouds.watch(&clouds);
-    let is_raw = |topic: &str| !topic.ends_with("/points_enu") && !topic.ends_with("/map_centers");
-    node.expect_publishers(
-        &clouds,
-        "the sensor's driver",
-        Some("points_topics"),
-        is_raw,
-    );
-    losses.watch(inputs.iter().chain(&clouds));
+    losses.watch(&inputs);
+    let to_inbox = inbox.clone();
+    let of_clouds = SubscribedClouds {
+        topics: settings.points_topics,
+        parameter: Some("points_topics"),
+        losses: vec![lost_clouds, losses],
+        hand_over: Box::new(move |topic, cloud| {
+            let bytes = bytes_of(&cloud);
+            let sent = to_inbox.send(Event::Cloud(Arc::clone(topic), cloud), bytes);
+            lost.fetch_add(u64::from(!sent), Ordering::Relaxed);
+        }),
+    };
+    let clouds = CloudSubscriptions::start(runtime, &node, of_clouds)?;
     let ticks = inbox.clone();
     let ticks = runtime.timer(Duration::from_millis(200), move || {
         // A full inbox checks its queue anyway.
@@ -252,7 +244,11 @@ impl ComputeState {
         let topics = &self.topics;
         let mut ins = |topic: &str, message| machine.on_ins(topic, message, now_ns);
         let outputs = match event {
-            Event::Cloud(topic, cloud) => machine.on_cloud(&topic, cloud, now_ns),
+            Event::Cloud(topic, Ok(cloud)) => machine.on_cloud(&topic, cloud, now_ns),
+            Event::Cloud(topic, Err(error)) => {
+                machine.on_unconverted(&topic, &error);
+                Vec::new()
+            }
             Event::Transforms(m, is_static) => machine.on_tf(&m, is_static, now_ns),
             Event::Inspva(m) => ins(&topics.ins, InsMessage::Inspva(&m)),
             Event::Inspvax(m) => ins(&topics.ins, InsMessage::Inspvax(&m)),

@@ -9,7 +9,7 @@ use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
-    "points_topics" fixed(TOPIC): "Topics of the sensors' clouds (sensor_msgs/PointCloud2); at least one.";
+    "points_topics" fixed(TOPIC): "Topics of the sensors' clouds: PointCloud2, PointCloud, LaserScan, MultiEchoLaserScan, or CustomMsg of Livox; at least one.";
     "ins.source" fixed(TOPIC): "Source of poses: inspva, inspvax, navsatfix_imu, odometry, pose, pose_with_covariance, or tf (transforms from map_frame to base_frame by other nodes).";
     "ins.topic" fixed(TOPIC): "Topic of the INS; for navsatfix_imu that of the NavSatFix.";
     "ins.imu_topic" fixed(TOPIC): "Topic of the attitude, for navsatfix_imu.";

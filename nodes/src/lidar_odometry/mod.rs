@@ -26,6 +26,7 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use motions::Motions;
 use nalgebra::{Point3, Vector3};
 
+use crate::cloud_input::CloudInputError;
 use crate::convert::{cloud, geometry};
 use crate::enu_transformer::{CloudNote, CloudNotes, CloudTimes, Refusal, Refusals};
 
@@ -161,6 +162,13 @@ impl LidarOdometry {
             }
         }
         found
+    }
+
+    /// Counts a cloud of a topic that was not converted.
+    pub fn on_unconverted(&mut self, topic: &str, error: &CloudInputError) {
+        self.counts.clouds_in += 1;
+        self.counts.clouds_malformed += 1;
+        (self.refusals).add(topic, "clouds_malformed", || error.to_string());
     }
 
     /// The pose of the scan that waits, without further samples of other sensors.

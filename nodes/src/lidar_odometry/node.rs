@@ -5,14 +5,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use lattice_core::odometry::{LostCause, ScanResult, Verdict};
 use lattice_msgs::nav_msgs::{Odometry, Path};
-use lattice_msgs::sensor_msgs::{Imu, PointCloud2};
+use lattice_msgs::sensor_msgs::Imu;
 use lattice_msgs::tf2_msgs::TFMessage;
 
 use super::parameters::Settings;
 use super::path::ThinPath;
 use super::{LidarOdometry, OdometryReport};
+use crate::cloud_input::{CloudSubscriptions, Converted, SubscribedClouds, bytes_of};
 use crate::compute::Compute;
-use crate::convert::cloud;
 use crate::report;
 use crate::start::{Finish, NodeError};
 use lattice_runtime::qos::Qos;
@@ -23,7 +23,7 @@ use lattice_runtime::{
 
 /// Event for the compute thread.
 enum Event {
-    Cloud(Arc<PointCloud2>),
+    Cloud(Converted),
     Transforms(Arc<TFMessage>, bool),
     Imu(Arc<Imu>),
     Wheels(Arc<Odometry>),
@@ -79,16 +79,18 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         };
         transforms.push(node.subscribe(topic, qos, SubscriptionExecutor::Shared, handler)?);
     }
-    let hand_over = inbox.counting(&lost, Event::Cloud, |cloud| cloud::bytes_of(cloud));
-    let clouds = vec![node.subscribe(
-        POINTS,
-        Qos::SCANS,
-        SubscriptionExecutor::Dedicated,
-        hand_over,
-    )?];
-    let is_raw = |topic: &str| !topic.ends_with("/points_enu") && !topic.ends_with("/map_centers");
-    node.expect_publishers(&clouds, "the sensor's driver", None, is_raw);
-    losses.watch(&clouds);
+    let to_inbox = inbox.clone();
+    let of_clouds = SubscribedClouds {
+        topics: vec![POINTS.to_owned()],
+        parameter: None,
+        losses: vec![losses],
+        hand_over: Box::new(move |_, cloud| {
+            let bytes = bytes_of(&cloud);
+            let sent = to_inbox.send(Event::Cloud(cloud), bytes);
+            lost.fetch_add(u64::from(!sent), Ordering::Relaxed);
+        }),
+    };
+    let clouds = CloudSubscriptions::start(runtime, &node, of_clouds)?;
     let on_imu = inbox.counting(&motion_lost, Event::Imu, |_| 0);
     let on_wheels = inbox.counting(&motion_lost, Event::Wheels, |_| 0);
     let motion = (
@@ -143,10 +145,14 @@ impl Shell {
     fn on(&mut self, event: Event) {
         match event {
             Event::Cloud(cloud) => {
-                let (refused, found) = (
-                    self.machine.counts().clouds_refused(),
-                    self.machine.on_cloud(POINTS, &cloud, 0),
-                );
+                let refused = self.machine.counts().clouds_refused();
+                let found = match cloud {
+                    Ok(cloud) => self.machine.on_cloud(POINTS, &cloud, 0),
+                    Err(error) => {
+                        self.machine.on_unconverted(POINTS, &error);
+                        Vec::new()
+                    }
+                };
                 found
                     .into_iter()
                     .for_each(|found| self.publish(&found.result));

@@ -3,6 +3,7 @@
 //! Messages pass in the order of the log, so the map depends on nothing else.
 
 mod disorder;
+mod packets;
 mod plan;
 mod poses;
 mod report;
@@ -16,7 +17,6 @@ pub use report::{LatticeReport, RunReport};
 pub use scan_poses::{OdometryInput, ScanPosesReport, feed_odometry};
 pub use topics::{Role, TopicError};
 
-use std::sync::Arc;
 use std::time::Instant;
 
 use lattice_core::pose::StampedPose;
@@ -165,7 +165,13 @@ impl Pipeline {
         let machine = &mut self.transformer;
         let mut ins = |message: InsMessage| machine.on_ins(topic, message, now_ns);
         Ok(match role {
-            Role::Cloud => machine.on_cloud(topic, Arc::new(cdr::from_slice(data)?), now_ns),
+            Role::Cloud(of) => match of.decode(data)?.into_cloud() {
+                Ok(cloud) => machine.on_cloud(topic, cloud, now_ns),
+                Err(error) => {
+                    machine.on_unconverted(topic, &error);
+                    Vec::new()
+                }
+            },
             Role::Transforms(is_static) => {
                 machine.on_tf(&cdr::from_slice(data)?, is_static, now_ns)
             }
@@ -285,7 +291,7 @@ pub fn run(
     let span_ns = end_ns.saturating_sub(start_ns).max(1) as f64;
     let whole = *slice == Slice::WHOLE;
     let before = ReadOptions {
-        topics: Some(plan.names(bag, |role| role != Role::Cloud)),
+        topics: Some(plan.names(bag, |role| !role.is_cloud())),
         end_ns: Some(from_ns),
         ..ReadOptions::default()
     };
@@ -319,9 +325,10 @@ pub fn run(
         for message in bag.messages(&options)? {
             let message = message?;
             let role = plan.roles.get(&message.topic).copied();
-            let behind = role == Some(Role::Cloud) && message.log_time_ns >= to_ns;
+            let is_cloud = role.is_some_and(Role::is_cloud);
+            let behind = is_cloud && message.log_time_ns >= to_ns;
             if let Some(role) = role.filter(|_| !behind) {
-                clouds += u64::from(role == Role::Cloud);
+                clouds += u64::from(is_cloud);
                 let topic = bag.topics().get(message.topic);
                 let topic = topic.map_or("", |topic| topic.name.as_str());
                 let of_scans = odometry

@@ -4,14 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use lattice_bag::{BagReader, TopicInfo};
 use lattice_msgs::RosMessage;
-use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 
 use super::disorder;
+use super::packets;
 use super::poses::{Log, Poses};
 use super::statics::LateStatics;
 use super::survey::{self, CloudTopic, FrameTree};
 use super::topics::{Role, TopicError, listing};
+use crate::cloud_input::CloudType;
 use crate::enu_transformer::ins::InsSource;
 
 /// Wishes of the user; empty or `None` is "find out".
@@ -57,7 +58,7 @@ pub struct TopicPlan {
 impl TopicPlan {
     /// Clouds of the log that are replayed.
     pub fn clouds(&self, bag: &BagReader) -> u64 {
-        let topics = self.topics(bag, |role| role == Role::Cloud);
+        let topics = self.topics(bag, Role::is_cloud);
         topics.map(|topic| topic.message_count).sum()
     }
 
@@ -71,6 +72,17 @@ impl TopicPlan {
         topics.filter_map(|(i, _)| bag.topics().get(*i))
     }
 
+    /// Line for lidar odometry on scans in one plane.
+    fn planar_odometry(&self, bag: &BagReader) -> Option<String> {
+        let topic = self.odometry?;
+        let is_planar = |role: &Role| matches!(role, Role::Cloud(of) if of.is_planar());
+        self.roles.get(&topic).filter(|role| is_planar(role))?;
+        let name = bag.topics().get(topic).map(|topic| &topic.name)?;
+        Some(format!(
+            "{name} is of a planar scanner, which shows no height, roll or pitch: record odometry or /tf beside it"
+        ))
+    }
+
     /// Names of the topics with a role that is wanted.
     pub(super) fn names(&self, bag: &BagReader, wanted: impl Fn(Role) -> bool) -> Vec<String> {
         let topics = self.topics(bag, wanted);
@@ -82,15 +94,15 @@ impl TopicPlan {
 pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicError> {
     let mut clouds = survey::clouds(bag)?;
     if !wishes.points.is_empty() {
-        let find = |name: &String| find(bag, name, PointCloud2::TYPE);
-        let wanted = wishes.points.iter().map(find);
+        let wanted = wishes.points.iter().map(|name| find_cloud(bag, name));
         let wanted: BTreeSet<usize> = wanted.collect::<Result<_, _>>()?;
         clouds.retain(|cloud| wanted.contains(&cloud.topic));
     }
     if clouds.is_empty() {
         return Err(TopicError::NoClouds {
-            type_name: PointCloud2::TYPE,
+            types: type_names(),
             has: listing(bag),
+            remedy: packets::remedy(bag),
         });
     }
     let transforms = transforms(bag, &clouds)?;
@@ -110,7 +122,9 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
         _ => log.chosen_clouds(&poses, &map_frame),
     };
     let mut roles = BTreeMap::new();
-    roles.extend(chosen.into_iter().map(|topic| (topic, Role::Cloud)));
+    let type_of = |topic: &usize| log.clouds.iter().find(|cloud| cloud.topic == *topic);
+    let of_clouds = chosen.iter().filter_map(type_of);
+    roles.extend(of_clouds.map(|cloud| (cloud.topic, Role::Cloud(cloud.cloud_type))));
     roles.extend(
         poses
             .topics
@@ -133,6 +147,7 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
     let of_ins = plan.names(bag, |role| matches!(role, Role::Ins(_)));
     plan.pose_delay_ns = disorder::delay_ns(bag, of_ins)?;
     plan.choices = said(bag, &plan);
+    plan.choices.extend(plan.planar_odometry(bag));
     plan.choices.extend(log.choices);
     let late = LateStatics::read(bag, &plan)?;
     plan.choices.extend(late.lines);
@@ -175,7 +190,7 @@ fn said(bag: &BagReader, plan: &TopicPlan) -> Vec<String> {
         ..
     } = plan;
     vec![
-        format!("clouds: {}", names(|role| role == Role::Cloud)),
+        format!("clouds: {}", names(Role::is_cloud)),
         format!("poses: {poses}, as {source}, of {base_frame} in {map_frame}"),
         format!("transforms: {tf}"),
     ]
@@ -223,7 +238,12 @@ impl Log<'_> {
         let mut best: BTreeMap<&str, &CloudTopic> = BTreeMap::new();
         let rank = |cloud: &CloudTopic| {
             let count = self.count(cloud.topic);
-            (cloud.labelled, u64::MAX - count, cloud.topic)
+            (
+                cloud.labelled,
+                cloud.cloud_type,
+                u64::MAX - count,
+                cloud.topic,
+            )
         };
         for cloud in self.clouds.iter().filter(|cloud| is_taken(&cloud.frame)) {
             let best = best.entry(&cloud.frame).or_insert(cloud);
@@ -287,6 +307,24 @@ fn transforms(bag: &BagReader, clouds: &[CloudTopic]) -> Result<Vec<(usize, bool
         found.extend(chosen.map(|(topic, _)| (*topic, is_static)));
     }
     Ok(found)
+}
+
+/// Place of a topic of clouds that the user names.
+fn find_cloud(bag: &BagReader, name: &str) -> Result<usize, TopicError> {
+    let mut topics = bag.topics().iter();
+    topics
+        .position(|topic| topic.name == name && CloudType::of(&topic.type_name).is_some())
+        .ok_or_else(|| TopicError::MissingClouds {
+            name: name.to_owned(),
+            types: type_names(),
+            has: listing(bag),
+            remedy: packets::remedy(bag),
+        })
+}
+
+/// Types of clouds, for an error.
+fn type_names() -> String {
+    CloudType::ALL.map(CloudType::name).join(", ")
 }
 
 /// Place of a topic of a type that the user names.

@@ -253,6 +253,7 @@ impl Log<'_> {
             let is_carried = self.known_base().is_some_and(|base| is_carried(&base));
             (
                 is_carried,
+                !cloud.cloud_type.is_planar(),
                 self.count(cloud.topic),
                 std::cmp::Reverse(cloud.topic),
             )

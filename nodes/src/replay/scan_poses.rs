@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::plan::TopicPlan;
 use super::topics::{Role, TopicError};
+use crate::cloud_input::SensorCloud;
 use crate::enu_transformer::Refusal;
 use crate::lidar_odometry::{
     LidarOdometry, LidarOdometryOptions, OdometryCounts, PAUSE_NS, Registered, odometry_message,
@@ -163,9 +164,10 @@ pub fn feed_odometry(
     for message in bag.messages(&read)? {
         let message = message?;
         match plan.roles.get(&message.topic) {
-            Some(Role::Cloud) if message.topic == topic => {
-                // What does not decode is counted when it is mapped.
-                if let Ok(cloud) = cdr::from_slice::<PointCloud2>(&message.data) {
+            Some(Role::Cloud(of)) if message.topic == topic => {
+                // What does not decode or is not converted is counted when it is mapped.
+                let decoded = of.decode(&message.data).ok();
+                if let Some(Ok(cloud)) = decoded.map(SensorCloud::into_cloud) {
                     let input = OdometryInput::Cloud(name(topic), &cloud, message.log_time_ns);
                     on_input(machine, input);
                 }

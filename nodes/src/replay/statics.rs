@@ -42,7 +42,7 @@ impl LateStatics {
                 ..ReadOptions::default()
             })
         };
-        let Some(first) = messages(|role| role == Role::Cloud)?.next() else {
+        let Some(first) = messages(Role::is_cloud)?.next() else {
             return Ok(found);
         };
         let cloud_ns = first?.log_time_ns;

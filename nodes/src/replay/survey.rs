@@ -5,14 +5,15 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use lattice_bag::{BagReader, ReadOptions};
 use lattice_core::pose::{TransformBuffer, TransformBufferOptions};
 use lattice_msgs::RosMessage;
-use lattice_msgs::cdr;
+use lattice_msgs::cdr::{self, CdrError};
 use lattice_msgs::geometry_msgs::{PoseStamped, PoseWithCovarianceStamped};
 use lattice_msgs::nav_msgs::Odometry;
-use lattice_msgs::sensor_msgs::{Imu, PointCloud2};
+use lattice_msgs::sensor_msgs::Imu;
 use lattice_msgs::tf2_msgs::TFMessage;
 use serde::de::DeserializeOwned;
 
 use super::TopicError;
+use crate::cloud_input::CloudType;
 use crate::convert::geometry;
 
 /// Part of a log searched for frames of `/tf`, ns.
@@ -27,6 +28,7 @@ const MAX_FRAMES: usize = 2000;
 /// A cloud topic, described by its first message.
 pub(super) struct CloudTopic {
     pub topic: usize,
+    pub cloud_type: CloudType,
     pub frame: String,
     pub labelled: bool,
 }
@@ -148,15 +150,19 @@ impl FrameTree {
 /// Cloud topics with messages.
 pub(super) fn clouds(bag: &BagReader) -> Result<Vec<CloudTopic>, TopicError> {
     let mut clouds = Vec::new();
-    for topic in topics_of(bag, PointCloud2::TYPE) {
-        if let Some(cloud) = first::<PointCloud2>(bag, topic)? {
+    for cloud_type in CloudType::ALL {
+        for topic in topics_of(bag, cloud_type.name()) {
+            let message = first_of(bag, topic, |data| cloud_type.decode(data))?;
+            let Some(message) = message else { continue };
             clouds.push(CloudTopic {
                 topic,
-                frame: bare(&cloud.header.frame_id),
-                labelled: cloud.fields.iter().any(|field| field.name == "label"),
+                cloud_type,
+                frame: bare(&message.header().frame_id),
+                labelled: message.is_labelled(),
             });
         }
     }
+    clouds.sort_by_key(|cloud| cloud.topic);
     Ok(clouds)
 }
 
@@ -265,13 +271,21 @@ pub(super) fn topics_of<'a>(
 
 /// First message of a topic, if it decodes.
 fn first<M: DeserializeOwned>(bag: &BagReader, topic: usize) -> Result<Option<M>, TopicError> {
+    first_of(bag, topic, cdr::from_slice)
+}
+
+fn first_of<M>(
+    bag: &BagReader,
+    topic: usize,
+    decode: impl Fn(&[u8]) -> Result<M, CdrError>,
+) -> Result<Option<M>, TopicError> {
     let name = bag.topics().get(topic).map(|topic| topic.name.clone());
     let options = ReadOptions {
         topics: Some(name.into_iter().collect()),
         ..ReadOptions::default()
     };
     match bag.messages(&options)?.next() {
-        Some(message) => Ok(cdr::from_slice(&message?.data).ok()),
+        Some(message) => Ok(decode(&message?.data).ok()),
         None => Ok(None),
     }
 }

@@ -3,6 +3,8 @@
 use lattice_bag::{BagError, BagReader};
 use thiserror::Error;
 
+use crate::cloud_input::CloudType;
+
 /// Reason for which a log cannot be replayed.
 #[derive(Debug, Error)]
 pub enum TopicError {
@@ -26,13 +28,27 @@ pub enum TopicError {
         /// Topics of that type, or of any.
         has: String,
     },
-    /// Nothing to map.
-    #[error("no {type_name} topic in the log; it has {has}")]
-    NoClouds {
-        /// Needed type.
-        type_name: &'static str,
+    /// A topic of clouds that was asked for.
+    #[error("no topic '{name}' of clouds in the log ({types}); it has {has}{remedy}")]
+    MissingClouds {
+        /// Asked for.
+        name: String,
+        /// Types of clouds.
+        types: String,
         /// Topics of the log.
         has: String,
+        /// Command that makes clouds of what it has; may be empty.
+        remedy: String,
+    },
+    /// Nothing to map.
+    #[error("no topic of clouds in the log ({types}); it has {has}{remedy}")]
+    NoClouds {
+        /// Types of clouds.
+        types: String,
+        /// Topics of the log.
+        has: String,
+        /// Command that makes clouds of what it has; may be empty.
+        remedy: String,
     },
     /// Clouds of several robots.
     #[error("clouds of several robots: {robots}; choose those of one with --points TOPIC")]
@@ -49,11 +65,18 @@ pub enum TopicError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// A sensor's clouds.
-    Cloud,
+    Cloud(CloudType),
     /// One kind of INS message.
     Ins(&'static str),
     /// `/tf` or, if true, `/tf_static`.
     Transforms(bool),
+}
+
+impl Role {
+    /// True for clouds of any type.
+    pub fn is_cloud(self) -> bool {
+        matches!(self, Self::Cloud(_))
+    }
 }
 
 /// The topics of a log with their types, for an error.

@@ -5,11 +5,16 @@ use std::sync::Arc;
 use lattice_core::cloud::{Cloud, CloudLimits};
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::{Changes, VoxelList};
+use lattice_msgs::geometry_msgs::Point32;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::livox_ros_driver2::{CustomMsg, CustomPoint};
 use lattice_msgs::nav_msgs::Odometry;
-use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
+use lattice_msgs::sensor_msgs::{
+    ChannelFloat32, LaserEcho, LaserScan, MultiEchoLaserScan, PointCloud, PointCloud2, PointField,
+};
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::{MessageVisitor, RosMessage, cdr, visit_messages};
+use lattice_nodes::cloud_input::{CloudType, SensorCloud};
 use lattice_nodes::convert::cloud::{cloud_from_message, field};
 use lattice_nodes::convert::map::{History, MapStamp, keyframe, sign, update};
 use lattice_nodes::convert::semantic::{SemanticOptions, semantic_from_message};
@@ -43,11 +48,17 @@ pub fn message(bytes: &[u8]) {
     }
 }
 
-/// Takes a PointCloud2 through every reader that there is, and the transformer.
+/// Takes a cloud of each type through every reader that there is, and the transformer.
 pub fn cloud(bytes: &[u8]) {
-    let Ok(message) = cdr::from_slice::<PointCloud2>(bytes) else {
-        return;
-    };
+    for cloud_type in CloudType::ALL {
+        let decoded = cloud_type.decode(bytes).ok();
+        if let Some(Ok(message)) = decoded.map(SensorCloud::into_cloud) {
+            read_cloud(message);
+        }
+    }
+}
+
+fn read_cloud(message: Arc<PointCloud2>) {
     let limits = CloudLimits { max_points: MOST };
     if let Ok(cloud) = cloud_from_message(&message, &limits, &Vector3::zeros()) {
         assert!(cloud.offsets_m.len() <= MOST);
@@ -73,7 +84,7 @@ pub fn cloud(bytes: &[u8]) {
         pose.pose.pose.position.x = i as f64;
         transformer.on_ins("ins", InsMessage::Odometry(&pose), at_ns);
     }
-    for output in transformer.on_cloud("points", Arc::new(message), stamp_ns) {
+    for output in transformer.on_cloud("points", message, stamp_ns) {
         if let EnuOutput::Points(points) = output {
             cloud_from_message(&points, &limits, &Vector3::zeros()).unwrap();
         }
@@ -156,7 +167,56 @@ pub fn cloud_seeds() -> Vec<Vec<u8>> {
         message.data = ByteBuf::from(vec![65; message.row_step as usize]);
         cdr::to_vec(&message).unwrap()
     };
-    forms.iter().map(seed).collect()
+    forms.iter().map(seed).chain(scan_seeds()).collect()
+}
+
+/// A message of each other type of clouds.
+fn scan_seeds() -> [Vec<u8>; 4] {
+    let header = || Header {
+        stamp: lattice_msgs::builtin_interfaces::Time::from_ns(1_000_000_000_000),
+        frame_id: "base_link".into(),
+    };
+    let ranges = vec![1.0, f32::INFINITY, f32::NAN, 2.0];
+    let echo = |echoes: &[f32]| LaserEcho {
+        echoes: echoes.to_vec(),
+    };
+    let point = CustomPoint {
+        x: 1.0,
+        offset_time: 1_000_000,
+        ..CustomPoint::default()
+    };
+    [
+        cdr::to_vec(&LaserScan {
+            header: header(),
+            angle_increment: 0.1,
+            time_increment: 1e-3,
+            range_max: 10.0,
+            intensities: vec![1.0; ranges.len()],
+            ranges,
+            ..LaserScan::default()
+        }),
+        cdr::to_vec(&MultiEchoLaserScan {
+            header: header(),
+            angle_increment: 0.1,
+            time_increment: 1e-3,
+            ranges: vec![echo(&[1.0, 2.0]), echo(&[])],
+            ..MultiEchoLaserScan::default()
+        }),
+        cdr::to_vec(&CustomMsg {
+            header: header(),
+            points: vec![point; 3],
+            ..CustomMsg::default()
+        }),
+        cdr::to_vec(&PointCloud {
+            header: header(),
+            points: vec![Point32::default(); 2],
+            channels: vec![ChannelFloat32 {
+                name: "time".into(),
+                values: vec![0.0, 0.1],
+            }],
+        }),
+    ]
+    .map(Result::unwrap)
 }
 
 /// Seeds of [`follower`]: a keyframe, an update, a quiet second.

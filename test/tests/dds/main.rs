@@ -17,6 +17,7 @@ mod odometry;
 mod params;
 mod rclpy;
 mod rgbd;
+mod scans;
 mod second_parent;
 mod security;
 #[cfg(feature = "onnx")]

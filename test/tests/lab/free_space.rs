@@ -38,6 +38,7 @@ fn log(folder: &Path, person: bool) -> PathBuf {
         duration_s: DURATION_S,
         begin_s: 0.0,
         person,
+        scans: false,
         ins_offset: [0.0; 4],
         storage: Storage::Mcap,
         out: out.clone(),

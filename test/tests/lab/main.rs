@@ -6,4 +6,5 @@ mod free_space;
 mod house;
 mod printed_formulas;
 mod replay_kitti;
+mod scans;
 mod simulate;

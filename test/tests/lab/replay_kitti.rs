@@ -102,7 +102,7 @@ fn the_sqlite3_log_is_the_first_three_scans() {
         let Some(role) = plan.roles.get(&message.topic) else {
             continue;
         };
-        if *role == replay::Role::Cloud {
+        if role.is_cloud() {
             clouds += 1;
             if clouds > 3 {
                 continue;

@@ -25,6 +25,7 @@ fn options(out: &Path, storage: Storage, seed: u64) -> BobcatOptions {
         duration_s: DURATION_S,
         begin_s: 0.0,
         person: false,
+        scans: false,
         ins_offset: [0.0; 4],
         storage,
         out: out.to_owned(),

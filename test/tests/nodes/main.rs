@@ -1,5 +1,6 @@
 //! The state machines of the nodes, without I/O.
 
+mod cloud_input;
 mod counters;
 mod enu_transformer;
 mod free_space;

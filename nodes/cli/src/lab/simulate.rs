@@ -69,6 +69,10 @@ pub struct Bobcat {
     /// Let a person walk through the yard in the first 15 s
     #[arg(long)]
     person: bool,
+    /// Write the lasers as their drivers do: LaserScan on /left/scan, /right/scan and /top/scan in place of
+    /// PointCloud2
+    #[arg(long)]
+    scans: bool,
     /// Constant error of the INS, as by a base station at wrong coordinates: m to the east, north and up,
     /// degrees about up
     #[arg(long, num_args = 4, allow_negative_numbers = true, value_names = ["EAST", "NORTH", "UP", "TURN"])]
@@ -141,6 +145,7 @@ impl Bobcat {
             duration_s: self.duration,
             begin_s: self.begin,
             person: self.person,
+            scans: self.scans,
             ins_offset: match self.ins_offset.as_deref() {
                 Some(&[east_m, north_m, up_m, turn_deg]) => [east_m, north_m, up_m, turn_deg],
                 _ => [0.0; 4],

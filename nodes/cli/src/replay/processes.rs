@@ -137,7 +137,7 @@ impl DdsReplay<'_> {
     }
 
     fn clouds(&self) -> Vec<&str> {
-        self.topic(|role| role == Role::Cloud)
+        self.topic(Role::is_cloud)
     }
 
     /// Remap rules for transform topics with other names than the nodes use.

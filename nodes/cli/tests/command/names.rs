@@ -3,7 +3,7 @@
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::sensor_msgs::{LaserScan, PointCloud2};
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
@@ -159,6 +159,7 @@ fn a_topic_without_publisher_is_named_beside_others_of_its_type() {
     let peer = peer(&domain);
     let node = peer.node("peer").unwrap();
     let clouds = ["/velodyne_points", "/map_centers"];
+    let _scan = node.publisher::<LaserScan>("/scan", Qos::SCANS).unwrap();
     let _clouds = clouds.map(|topic| node.publisher::<PointCloud2>(topic, Qos::SCANS).unwrap());
     let odometry = "nav_msgs/msg/Odometry";
     let _odometry = node.raw_publisher("/points", odometry, None, Qos::DEFAULT);
@@ -180,6 +181,8 @@ fn a_topic_without_publisher_is_named_beside_others_of_its_type() {
             "[WARN]",
             "no publisher on /points (sensor_msgs/msg/PointCloud2) after 3 s",
             "no publisher on /odom (nav_msgs/msg/Odometry) after 3 s",
+            "no publisher on /points; of other types of clouds there are: /scan (sensor_msgs/msg/LaserScan); remap \
+             with -r points:=TOPIC, or set points_topics",
         ],
     );
     stated(

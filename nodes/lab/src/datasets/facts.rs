@@ -41,6 +41,15 @@ pub fn points_topic(laser: Laser) -> &'static str {
     }
 }
 
+/// Topic of a laser's scans, in a log of them.
+pub fn scan_topic(laser: Laser) -> &'static str {
+    match laser {
+        Laser::Left => "/left/scan",
+        Laser::Right => "/right/scan",
+        Laser::Top => "/top/scan",
+    }
+}
+
 /// Start of the log, UTC, ns since the Unix epoch.
 pub fn bobcat_start_ns() -> i64 {
     utc_ns_from_gps(BOBCAT_GPS_WEEK, BOBCAT_GPS_WEEK_MS, BOBCAT_LEAP_SECONDS)

@@ -2,7 +2,7 @@
 
 use super::facts::{
     INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, bobcat_origin, bobcat_start_ns,
-    points_topic,
+    points_topic, scan_topic,
 };
 use super::messages;
 use crate::AnyError;
@@ -25,7 +25,7 @@ pub struct LogEntry {
     /// Time of arrival at the recorder, UTC, ns since the Unix epoch.
     pub log_time_ns: i64,
     pub cdr: Vec<u8>,
-    /// For a cloud its points without noise, in the map frame (m), in the order of the cloud.
+    /// For a cloud or a scan its points without noise, in the map frame (m), in their order.
     pub true_points_m: Vec<[f32; 3]>,
 }
 
@@ -43,6 +43,8 @@ pub(super) struct Block<'a> {
 /// Computes a log block by block; the memory it takes does not grow with the duration.
 pub(super) struct Log<'a> {
     bobcat: &'a Bobcat,
+    /// True for LaserScan in place of PointCloud2.
+    scans: bool,
     map: EnuFrame,
     samples: std::iter::Peekable<InsSamples<'a>>,
     next_scan: [u64; 3],
@@ -52,7 +54,7 @@ pub(super) struct Log<'a> {
 }
 
 impl<'a> Log<'a> {
-    pub(super) fn new(bobcat: &'a Bobcat) -> Result<Self, AnyError> {
+    pub(super) fn new(bobcat: &'a Bobcat, scans: bool) -> Result<Self, AnyError> {
         let mounts = LogEntry {
             topic: TF_STATIC_TOPIC,
             log_time_ns: bobcat_start_ns().saturating_add(bobcat.begin_ns()),
@@ -61,6 +63,7 @@ impl<'a> Log<'a> {
         };
         Ok(Self {
             bobcat,
+            scans,
             map: EnuFrame::new(bobcat_origin()?),
             samples: bobcat.ins().peekable(),
             next_scan: Laser::ALL.map(|laser| bobcat.first_scan(laser)),
@@ -125,10 +128,20 @@ impl<'a> Log<'a> {
         let arrival_ns = scan.start_ns + crate::simulate::SCAN_SPAN_NS + CLOUD_DELAY_NS;
         let returns = scan.returns.iter();
         let truth = returns.map(|hit| hit.truth_m.cast::<f32>().into());
+        let (topic, cdr) = match self.scans {
+            true => (
+                scan_topic(laser),
+                cdr::to_vec(&messages::laser_scan(laser, &scan))?,
+            ),
+            false => (
+                points_topic(laser),
+                cdr::to_vec(&messages::cloud(laser, &scan))?,
+            ),
+        };
         Ok(LogEntry {
-            topic: points_topic(laser),
+            topic,
             log_time_ns: bobcat_start_ns().saturating_add(arrival_ns),
-            cdr: cdr::to_vec(&messages::cloud(laser, &scan))?,
+            cdr,
             true_points_m: truth.collect(),
         })
     }
@@ -159,7 +172,7 @@ mod tests {
 
     fn entries(seed: u64, duration_s: f64) -> Vec<LogEntry> {
         let bobcat = Bobcat::new(seed, duration_s).unwrap();
-        let mut log = Log::new(&bobcat).unwrap();
+        let mut log = Log::new(&bobcat, false).unwrap();
         let mut entries = Vec::new();
         while let Some(block) = log.next_block().unwrap() {
             entries.extend(block.entries);
@@ -186,7 +199,7 @@ mod tests {
     #[test]
     fn a_later_log_has_what_a_longer_one_has_then() {
         let later = Bobcat::new(1, 1.5).unwrap().starting_at(3.0).unwrap();
-        let mut log = Log::new(&later).unwrap();
+        let mut log = Log::new(&later, false).unwrap();
         let mut found = Vec::new();
         while let Some(block) = log.next_block().unwrap() {
             found.extend(block.entries);

@@ -4,20 +4,24 @@ use super::facts::{
     BASE_FRAME, BOBCAT_GPS_WEEK, BOBCAT_GPS_WEEK_MS, BOBCAT_UNDULATION_M, IMU_FRAME, MAP_FRAME,
     TURNTABLE_FRAME, bobcat_start_ns,
 };
-use crate::simulate::{Bobcat, InsSample, Laser, Lms200Scan, base_from_imu};
+use crate::simulate::{BEAMS, Bobcat, InsSample, Laser, Lms200Scan, base_from_imu};
+use std::f32::consts::{FRAC_PI_2, PI};
+
 use lattice_core::geodesy::{EnuFrame, GeodesyError};
 use lattice_msgs::geometry_msgs::Vector3;
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::{
     INSExtendedSolutionStatus, INSPVAX, InertialSolutionStatus, Oem7Header, PositionOrVelocityType,
 };
-use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
+use lattice_msgs::sensor_msgs::{LaserScan, PointCloud2, PointField};
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_nodes::convert::cloud::{dense_cloud, xyz_fields};
 use lattice_nodes::convert::geometry::{header, pose_from, transform_stamped};
 
 /// x, y, z, intensity (f32) and t (u32).
 const POINT_STEP: u32 = 20;
+/// Range of an LMS200 for a beam without a return, m: 8183 cm, its code of a value beyond the range.
+const NO_RETURN_M: f32 = 81.83;
 const WEEK_MS: u64 = 604_800_000;
 /// Number of the INSPVAX log in the receiver's manual.
 const INSPVAX_ID: u16 = 1465;
@@ -50,6 +54,31 @@ pub(super) fn cloud(laser: Laser, scan: &Lms200Scan) -> PointCloud2 {
     }
     let header = header(laser.frame(), utc_ns(scan.start_ns));
     dense_cloud(header, fields, POINT_STEP, scan.returns.len(), data)
+}
+
+/// The same scan as drivers of the LMS200 publish it.
+pub(super) fn laser_scan(laser: Laser, scan: &Lms200Scan) -> LaserScan {
+    let mut ranges = vec![NO_RETURN_M; usize::from(BEAMS)];
+    let mut intensities = vec![0.0; usize::from(BEAMS)];
+    for hit in &scan.returns {
+        let beam = usize::from(hit.beam);
+        if let (Some(range_m), Some(intensity)) = (ranges.get_mut(beam), intensities.get_mut(beam))
+        {
+            (*range_m, *intensity) = (hit.range_m, hit.intensity);
+        }
+    }
+    LaserScan {
+        header: header(laser.frame(), utc_ns(scan.start_ns)),
+        angle_min: -FRAC_PI_2,
+        angle_max: FRAC_PI_2,
+        angle_increment: PI / f32::from(BEAMS - 1),
+        time_increment: 1.0 / 27_000.0,
+        scan_time: 1.0 / 75.0,
+        range_min: 0.0,
+        range_max: 81.0,
+        ranges,
+        intensities,
+    }
 }
 
 /// The IMU's pose as the NovAtel driver reports it: stamped on arrival, GPS time of validity in

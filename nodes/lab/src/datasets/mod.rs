@@ -11,6 +11,9 @@
 //! | `/tf` | `base_link` -> `top_turntable` | 100 Hz | exact |
 //! | `/tf_static` | `base_link` -> `left_laser`, `right_laser`, `imu`; `top_turntable` -> `top_laser` | once, latched | start |
 //!
+//! With [`BobcatOptions::scans`] the lasers write what drivers of the LMS200 do: LaserScan on `/left/scan`, `/right/scan`,
+//! `/top/scan`, with 81.83 m, beyond `range_max`, where a beam has no return.
+//!
 //! Beams without a return are absent from the clouds, as is what the lasers see of the loader itself.
 //! The map is east, north, up at [`BOBCAT_ORIGIN`]; the lever arm of the IMU is
 //! [`BASE_FROM_IMU_M`](crate::simulate::BASE_FROM_IMU_M) in `base_link`'s axes and its boresight is the identity.
@@ -40,7 +43,7 @@ pub use drive::{DriveLogOptions, DriveLogSummary, TRUTH_FILE, write_drive};
 pub use facts::{
     BASE_FRAME, BOBCAT_GPS_WEEK, BOBCAT_GPS_WEEK_MS, BOBCAT_LEAP_SECONDS, BOBCAT_ORIGIN,
     BOBCAT_UNDULATION_M, IMU_FRAME, INSPVAX_TOPIC, MAP_FRAME, ODOMETRY_TOPIC, TF_STATIC_TOPIC,
-    TF_TOPIC, TURNTABLE_FRAME, bobcat_origin, bobcat_start_ns, points_topic,
+    TF_TOPIC, TURNTABLE_FRAME, bobcat_origin, bobcat_start_ns, points_topic, scan_topic,
 };
 pub use house::{
     CLASSES_FILE, HeadsetAxes, HouseOptions, HouseSummary, MAP_FILE, SceneTruth, write_house,

@@ -1,6 +1,8 @@
 //! The simulated log as a rosbag2 directory.
 
-use super::facts::{INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, points_topic};
+use super::facts::{
+    INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, points_topic, scan_topic,
+};
 use super::log::{Block, Log};
 use super::truth::{self, Truth};
 use crate::simulate::{Bobcat, Laser};
@@ -8,7 +10,7 @@ use crate::{AnyError, at};
 use lattice_bag::{BagQos, BagWriter, Storage, TopicSpec, WriterOptions, replaceable};
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::INSPVAX;
-use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::sensor_msgs::{LaserScan, PointCloud2};
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::{RosMessage, hash_of};
 use nalgebra::{Isometry3, Vector3};
@@ -30,6 +32,8 @@ pub struct BobcatOptions {
     pub begin_s: f64,
     /// A person who walks through the yard.
     pub person: bool,
+    /// True for the scans of the lasers (LaserScan) in place of clouds (PointCloud2).
+    pub scans: bool,
     /// Constant error of the INS: east, north, up in m, then about up in degrees.
     pub ins_offset: [f64; 4],
     /// Storage of the bag.
@@ -49,9 +53,9 @@ pub struct BobcatSummary {
     pub duration_s: f64,
     /// Messages on all topics.
     pub messages: u64,
-    /// Clouds among them.
+    /// Clouds or scans among them.
     pub clouds: u64,
-    /// Points in the clouds.
+    /// Points in them.
     pub points: u64,
     /// INS epochs, each of which is an INSPVAX and an Odometry.
     pub ins_epochs: u64,
@@ -114,7 +118,7 @@ fn write_log(
     let writer = WriterOptions::default();
     let mut bag = BagWriter::create(&options.out, options.storage, writer)?;
     let mut topics = HashMap::new();
-    for topic in topic_specs() {
+    for topic in topic_specs(options.scans) {
         let name = topic.name.clone();
         topics.insert(name, bag.add_topic(topic)?);
     }
@@ -124,7 +128,7 @@ fn write_log(
         duration_s: options.duration_s,
         ..BobcatSummary::default()
     };
-    let mut log = Log::new(&bobcat)?;
+    let mut log = Log::new(&bobcat, options.scans)?;
     while let Some(block) = log.next_block()? {
         write_block(&block, &mut bag, &topics, &mut truth, &mut summary)?;
         let done_ns = block.end_ns.saturating_sub(bobcat.begin_ns());
@@ -148,7 +152,8 @@ fn write_block(
         truth.points(&entry.true_points_m)?;
         summary.messages += 1;
         summary.points += entry.true_points_m.len() as u64;
-        let is_cloud = Laser::ALL.map(points_topic).contains(&entry.topic);
+        let of_lasers = [points_topic, scan_topic].map(|name| Laser::ALL.map(name));
+        let is_cloud = of_lasers.as_flattened().contains(&entry.topic);
         summary.clouds += u64::from(is_cloud);
     }
     for sample in block.epochs {
@@ -159,13 +164,16 @@ fn write_block(
 }
 
 /// The topics as their publishers offer them.
-fn topic_specs() -> Vec<TopicSpec> {
+fn topic_specs(scans: bool) -> Vec<TopicSpec> {
     let reliable = |depth| BagQos {
         depth,
         ..BagQos::default()
     };
     let mut specs: Vec<_> = Laser::ALL
-        .map(|laser| spec::<PointCloud2>(points_topic(laser), reliable(20)))
+        .map(|laser| match scans {
+            true => spec::<LaserScan>(scan_topic(laser), reliable(20)),
+            false => spec::<PointCloud2>(points_topic(laser), reliable(20)),
+        })
         .into();
     specs.push(spec::<INSPVAX>(INSPVAX_TOPIC, reliable(100)));
     specs.push(spec::<Odometry>(ODOMETRY_TOPIC, reliable(100)));

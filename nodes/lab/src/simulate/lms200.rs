@@ -21,6 +21,8 @@ pub struct Lms200Return {
     pub beam: u16,
     /// Time since the start of the scan, ns.
     pub offset_ns: u32,
+    /// Measured range, with noise, m.
+    pub range_m: f32,
     /// Measured point in the scanner's frame, with range noise, m.
     pub point_m: [f32; 3],
     /// Remission, 0..255: reflectivity times cosine of incidence.
@@ -81,6 +83,7 @@ pub(super) fn scan(
             returns.push(Lms200Return {
                 beam,
                 offset_ns,
+                range_m: measured_m as f32,
                 point_m: [point.x as f32, point.y as f32, point.z as f32],
                 intensity: (255.0 * echo) as f32,
                 truth_m: origin + direction * hit.range_m,

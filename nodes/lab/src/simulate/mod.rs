@@ -38,6 +38,6 @@ pub use bobcat::{BASE_FROM_IMU_M, Laser};
 pub(crate) use bobcat::{BASE_FROM_TURNTABLE_M, Bobcat, TURNTABLE_PERIOD_NS, base_from_imu};
 pub use ins::INS_POSITION_RMS_M;
 pub(crate) use ins::{InsSample, InsSamples};
-pub(crate) use lms200::{Lms200Scan, MAX_RANGE_M, MIN_RANGE_M, RANGE_NOISE_M, SCAN_SPAN_NS};
+pub(crate) use lms200::{BEAMS, Lms200Scan, MAX_RANGE_M, MIN_RANGE_M, RANGE_NOISE_M, SCAN_SPAN_NS};
 pub(crate) use survey::Survey;
 pub use survey::SurveyPattern;

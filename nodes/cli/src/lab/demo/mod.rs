@@ -108,6 +108,7 @@ impl Demo {
             duration_s: self.duration,
             begin_s: 0.0,
             person: false,
+            scans: false,
             ins_offset: [0.0; 4],
             storage: Storage::Mcap,
             out: bag.clone(),

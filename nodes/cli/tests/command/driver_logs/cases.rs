@@ -75,7 +75,7 @@ pub fn cases() -> Vec<Case> {
 
 /// Logs of drivers and estimators as they are.
 pub fn drivers() -> Vec<Case> {
-    [lidars(), estimators(), positioning(), faults()].concat()
+    [lidars(), scans(), estimators(), positioning(), faults()].concat()
 }
 
 fn lidars() -> Vec<Case> {
@@ -87,6 +87,42 @@ fn lidars() -> Vec<Case> {
         mcap("robosense"),
         sqlite3("realsense").over_dds(),
         mcap("two_lidars").over_dds(),
+    ]
+}
+
+/// Drivers that publish no PointCloud2.
+fn scans() -> Vec<Case> {
+    vec![
+        mcap("rplidar")
+            .says(&[
+                "clouds: /scan (30 ",
+                "time of points: field 'since_stamp_ns', in ns",
+            ])
+            .over_dds(),
+        sqlite3("sick_scan"),
+        mcap("urg_node_echoes").over_dds(),
+        mcap("scan_alone").refused(&[
+            "lidar odometry on /scan",
+            "/scan is of a planar scanner",
+            "all scans of /scan are lost",
+        ]),
+        mcap("scan_with_other_lidar")
+            .says(&["clouds: /scan (30 messages), /velodyne_points (30 messages)"]),
+        sqlite3("scan_beside_clouds")
+            .says(&["not taken: /scan (of velodyne as /velodyne_points; "]),
+        mcap("livox_ros_driver2").over_dds(),
+        sqlite3("livox_ros_driver"),
+        mcap("livox_interfaces"),
+        sqlite3("point_cloud_1").over_dds(),
+        mcap("ouster_packets").refused(&[
+            "no topic of clouds",
+            "/ouster/lidar_packets has raw packets",
+            "ros2 launch ouster_ros replay.launch.xml",
+        ]),
+        sqlite3("velodyne_packets").refused(&[
+            "/velodyne_packets has raw packets",
+            "ros2 launch velodyne_pointcloud velodyne_transform_node-VLP16-launch.py",
+        ]),
     ]
 }
 
@@ -206,7 +242,6 @@ const MAST: &str = "ins.lever_arm_m:=[0.0, 0.0, 0.7937005259840998]";
 
 fn faults() -> Vec<Case> {
     vec![
-        mcap("livox_own_messages").refused(&["/livox/lidar", "livox_ros_driver2/msg/CustomMsg"]),
         sqlite3("gazebo_scoped_frame").refused(&["no transform base_link <- x500/lidar_link"]),
         mcap("lidar_without_mount")
             .refused(&["no transform base_link <- os_lidar"])
@@ -219,7 +254,10 @@ fn faults() -> Vec<Case> {
             ])
             .over_dds(),
         sqlite3("lidar_on_body").with(&["-p", "base_frame:=body"]),
-        mcap("no_clouds").refused(&["sensor_msgs/msg/PointCloud2", "/scan"]),
+        mcap("no_clouds").refused(&[
+            "sensor_msgs/msg/LaserScan",
+            "/range (sensor_msgs/msg/Range)",
+        ]),
         sqlite3("empty_clouds").refused(&["nothing was mapped: 0 points in 30 clouds"]),
         mcap("clouds_before_and_after_poses").over_dds(),
         sqlite3("sparse_poses").refused(&["max_pose_gap_s"]),

@@ -177,6 +177,12 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     ),
     ("docs/odometry.md", "lattice evaluate odometry", Runs("")),
     ("docs/odd_logs.md", "lattice replay LOG --direct", Runs("")),
+    (
+        "docs/sensors.md",
+        "lattice simulate bobcat",
+        Runs("--duration 2"),
+    ),
+    ("docs/sensors.md", "lattice replay scanned", Runs("")),
     ("docs/poses.md", "lattice bag info LOG", Runs("")),
     ("docs/poses.md", "lattice replay LOG --direct", Runs("")),
     (

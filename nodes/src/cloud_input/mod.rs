@@ -1,0 +1,217 @@
+//! Clouds of sensors: each message type with points or ranges, converted to PointCloud2.
+//!
+//! | type | points |
+//! |---|---|
+//! | sensor_msgs/PointCloud2 | as they are |
+//! | livox_ros_driver2, livox_ros_driver, livox_interfaces: CustomMsg | those that are not in the origin |
+//! | sensor_msgs/PointCloud | all, each channel as a field |
+//! | sensor_msgs/LaserScan | one for each ray |
+//! | sensor_msgs/MultiEchoLaserScan | one for each echo |
+//!
+//! Times of converted points are in the field [`TIME_FIELD`].
+
+mod channels;
+mod livox;
+mod records;
+mod scan;
+mod subscription;
+
+pub use channels::cloud_of_channels;
+pub use livox::cloud_of_livox;
+pub use records::TIME_FIELD;
+pub use scan::{cloud_of_echoes, cloud_of_scan};
+pub use subscription::{CloudSubscriptions, Converted, SubscribedClouds, bytes_of};
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use lattice_core::cloud::{TimeOptions, TimeReference, TimeUnit};
+use lattice_msgs::RosMessage;
+use lattice_msgs::cdr::{self, CdrError};
+use lattice_msgs::sensor_msgs::{LaserScan, MultiEchoLaserScan, PointCloud, PointCloud2};
+use lattice_msgs::std_msgs::Header;
+use lattice_msgs::{livox_interfaces, livox_ros_driver, livox_ros_driver2};
+use thiserror::Error;
+
+/// Limit of points of a converted message.
+pub const MAX_POINTS: usize = 4_000_000;
+
+/// Reason for which a message is not converted.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum CloudInputError {
+    /// Angle or time of a scan.
+    #[error("`{field}` is {value}, not finite: have the driver publish {unit}")]
+    NotFinite {
+        /// Field of the message.
+        field: &'static str,
+        /// Value.
+        value: f32,
+        /// Meaning and unit of the field.
+        unit: &'static str,
+    },
+    /// More points than are converted.
+    #[error(
+        "{points} points in a message are over {MAX_POINTS}: have the driver publish them in parts"
+    )]
+    TooManyPoints {
+        /// Points of the message.
+        points: usize,
+    },
+    /// A channel that is shorter or longer than the points.
+    #[error(
+        "channel '{channel}' has {values} values for {points} points: have the driver publish one for each point"
+    )]
+    ChannelLength {
+        /// Name of the channel.
+        channel: String,
+        /// Its values.
+        values: usize,
+        /// Points of the message.
+        points: usize,
+    },
+}
+
+/// Type of a message with points or ranges. An earlier one is preferred where several describe the same scan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum CloudType {
+    /// sensor_msgs/PointCloud2.
+    PointCloud2,
+    /// livox_ros_driver2/CustomMsg.
+    LivoxDriver2,
+    /// livox_ros_driver/CustomMsg.
+    LivoxDriver,
+    /// livox_interfaces/CustomMsg.
+    LivoxInterfaces,
+    /// sensor_msgs/PointCloud.
+    PointCloud,
+    /// sensor_msgs/LaserScan.
+    LaserScan,
+    /// sensor_msgs/MultiEchoLaserScan.
+    MultiEchoLaserScan,
+}
+
+impl CloudType {
+    /// All types.
+    pub const ALL: [Self; 7] = [
+        Self::PointCloud2,
+        Self::LivoxDriver2,
+        Self::LivoxDriver,
+        Self::LivoxInterfaces,
+        Self::PointCloud,
+        Self::LaserScan,
+        Self::MultiEchoLaserScan,
+    ];
+
+    /// Type of a name such as `sensor_msgs/msg/LaserScan`; `None` if it has no points.
+    pub fn of(type_name: &str) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|known| known.name() == type_name)
+    }
+
+    /// Name of the type.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PointCloud2 => PointCloud2::TYPE,
+            Self::LivoxDriver2 => livox_ros_driver2::CustomMsg::TYPE,
+            Self::LivoxDriver => livox_ros_driver::CustomMsg::TYPE,
+            Self::LivoxInterfaces => livox_interfaces::CustomMsg::TYPE,
+            Self::PointCloud => PointCloud::TYPE,
+            Self::LaserScan => LaserScan::TYPE,
+            Self::MultiEchoLaserScan => MultiEchoLaserScan::TYPE,
+        }
+    }
+
+    /// True for scans in one plane.
+    pub fn is_planar(self) -> bool {
+        matches!(self, Self::LaserScan | Self::MultiEchoLaserScan)
+    }
+
+    /// Decodes a message of the type.
+    pub fn decode(self, data: &[u8]) -> Result<SensorCloud, CdrError> {
+        Ok(match self {
+            Self::PointCloud2 => SensorCloud::PointCloud2(cdr::from_slice(data)?),
+            // The three have one layout.
+            Self::LivoxDriver2 | Self::LivoxDriver | Self::LivoxInterfaces => {
+                SensorCloud::Livox(cdr::from_slice(data)?)
+            }
+            Self::PointCloud => SensorCloud::PointCloud(cdr::from_slice(data)?),
+            Self::LaserScan => SensorCloud::LaserScan(cdr::from_slice(data)?),
+            Self::MultiEchoLaserScan => SensorCloud::MultiEchoLaserScan(cdr::from_slice(data)?),
+        })
+    }
+}
+
+/// A decoded message with points or ranges.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SensorCloud {
+    /// As it is.
+    PointCloud2(PointCloud2),
+    /// Of a Livox driver.
+    Livox(livox_ros_driver2::CustomMsg),
+    /// Of the type before PointCloud2.
+    PointCloud(PointCloud),
+    /// Of a planar laser.
+    LaserScan(LaserScan),
+    /// Of a planar laser with several echoes a ray.
+    MultiEchoLaserScan(MultiEchoLaserScan),
+}
+
+impl SensorCloud {
+    /// Time and frame.
+    pub fn header(&self) -> &Header {
+        match self {
+            Self::PointCloud2(message) => &message.header,
+            Self::Livox(message) => &message.header,
+            Self::PointCloud(message) => &message.header,
+            Self::LaserScan(message) => &message.header,
+            Self::MultiEchoLaserScan(message) => &message.header,
+        }
+    }
+
+    /// True if points have labels.
+    pub fn is_labelled(&self) -> bool {
+        let Self::PointCloud2(message) = self else {
+            return false;
+        };
+        message.fields.iter().any(|field| field.name == "label")
+    }
+
+    /// Points in the frame of the message.
+    pub fn into_cloud(self) -> Result<Arc<PointCloud2>, CloudInputError> {
+        let cloud = match self {
+            Self::PointCloud2(message) => message,
+            Self::Livox(message) => cloud_of_livox(&message)?,
+            Self::PointCloud(message) => cloud_of_channels(&message)?,
+            Self::LaserScan(message) => cloud_of_scan(&message)?,
+            Self::MultiEchoLaserScan(message) => cloud_of_echoes(&message)?,
+        };
+        Ok(Arc::new(cloud))
+    }
+}
+
+/// Options for the times of a cloud. Field and unit of a converted cloud are known: `time.field` and `time.unit` are for
+/// PointCloud2.
+pub fn time_options<'a>(cloud: &PointCloud2, options: &'a TimeOptions) -> Cow<'a, TimeOptions> {
+    let is_converted = cloud.fields.iter().any(|field| field.name == TIME_FIELD);
+    if !is_converted || options.field.as_deref() == Some("") {
+        return Cow::Borrowed(options);
+    }
+    let is_of_sweep = |reference: &TimeReference| *reference != TimeReference::Absolute;
+    Cow::Owned(TimeOptions {
+        field: Some(TIME_FIELD.to_owned()),
+        unit: Some(TimeUnit::Nanoseconds),
+        reference: options.reference.filter(is_of_sweep),
+        max_span_s: options.max_span_s,
+    })
+}
+
+fn check_count(points: usize) -> Result<(), CloudInputError> {
+    match points > MAX_POINTS {
+        true => Err(CloudInputError::TooManyPoints { points }),
+        false => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests;
