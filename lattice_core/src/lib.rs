@@ -5,6 +5,7 @@
 //! | find the cell of a point | [`lattice::Lattice`] |
 //! | map clouds | [`voxels::VoxelList`]; [`voxels::OccupancyList`] with a bit for each cell |
 //! | find nearest voxels, clearances and paths | [`query::Query`] |
+//! | drive on the ground | [`navigation::Projector`] |
 //! | know free space, or clear what moved | [`raycast::FreeSpaceMap`], [`raycast::RayClearer`] |
 //! | read point records of any layout | [`cloud::CloudLayout`] |
 //! | interpolate poses and frames | [`pose::PoseBuffer`], [`pose::TransformBuffer`] |
@@ -31,6 +32,7 @@ pub mod cloud;
 pub mod geodesy;
 mod kd_tree;
 pub mod lattice;
+pub mod navigation;
 #[cfg(feature = "registration")]
 pub mod odometry;
 pub mod pose;

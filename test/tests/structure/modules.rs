@@ -11,7 +11,7 @@ use super::source::{code, files, module};
 const LAYERS: [(&str, &str); 3] = [
     (
         "lattice_core/src",
-        "prefetch lattice kd_tree cloud geodesy pose voxels query raycast registration odometry",
+        "prefetch lattice kd_tree cloud geodesy pose voxels query raycast navigation registration odometry",
     ),
     (
         "nodes/src",
