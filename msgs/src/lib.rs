@@ -39,6 +39,7 @@ pub mod headset;
 mod interface;
 pub mod lattice;
 pub mod lifecycle_msgs;
+pub mod map_msgs;
 pub mod nav_msgs;
 pub mod novatel_oem7_msgs;
 pub mod octomap_msgs;

@@ -3,9 +3,9 @@
 use crate::interface::RosMessage;
 use crate::{
     action, action_msgs, builtin_interfaces, calibration, diagnostic_msgs, geographic_msgs,
-    geometry_msgs, headset, lattice, lifecycle_msgs, nav_msgs, novatel_oem7_msgs, octomap_msgs,
-    rcl_interfaces, rmw_dds_common, rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs,
-    std_srvs, tf2_msgs, type_description_interfaces, unique_identifier_msgs, vision_msgs,
+    geometry_msgs, headset, lattice, lifecycle_msgs, map_msgs, nav_msgs, novatel_oem7_msgs,
+    octomap_msgs, rcl_interfaces, rmw_dds_common, rosbag2_interfaces, rosgraph_msgs, sensor_msgs,
+    std_msgs, std_srvs, tf2_msgs, type_description_interfaces, unique_identifier_msgs, vision_msgs,
     visualization_msgs,
 };
 
@@ -31,6 +31,7 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     lattice::visit_services(visitor);
     lifecycle_msgs::visit_messages(visitor);
     lifecycle_msgs::visit_services(visitor);
+    map_msgs::visit_messages(visitor);
     nav_msgs::visit_messages(visitor);
     novatel_oem7_msgs::visit_messages(visitor);
     octomap_msgs::visit_services(visitor);

@@ -18,7 +18,7 @@ const MAX_SLOPE_DEG: f64 = 80.0;
 pub enum ProjectionError {
     /// Resolution too fine or too coarse for the lattice.
     #[error(
-        "resolution {found_m} m is outside {min_m:.4}..={max_m:.4} m for cells of {side_m:.4} m (`resolution`): \
+        "resolution {found_m} m is outside {min_m:.4}..={max_m:.4} m for cells of {side_m:.4} m (`resolution_m`): \
          0 takes the cell size"
     )]
     #[expect(missing_docs, reason = "the message names the fields")]
@@ -38,12 +38,12 @@ pub enum ProjectionError {
         max: f64,
     },
     /// Lower bound above the upper one.
-    #[error("height band {min_m}..={max_m} m is empty (`occupancy_min_z`, `occupancy_max_z`)")]
+    #[error("height band {min_m}..={max_m} m is empty (`occupancy_min_z_m`, `occupancy_max_z_m`)")]
     #[expect(missing_docs, reason = "the message names the fields")]
     Band { min_m: f64, max_m: f64 },
     /// Map too wide for its resolution.
     #[error(
-        "a grid of {width} x {height} cells exceeds {MAX_GRID_CELLS} cells: set a larger `resolution`, or crop the map"
+        "a grid of {width} x {height} cells exceeds {MAX_GRID_CELLS} cells: set a larger `resolution_m`, or crop the map"
     )]
     #[expect(missing_docs, reason = "the message names the fields")]
     TooLarge { width: u64, height: u64 },

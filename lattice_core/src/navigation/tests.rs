@@ -284,14 +284,14 @@ fn options_out_of_range_are_refused_by_name() {
             resolution_m: 0.01,
             ..options()
         },
-        "`resolution`",
+        "`resolution_m`",
     );
     refused(
         ProjectorOptions {
             resolution_m: f64::NAN,
             ..options()
         },
-        "`resolution`",
+        "`resolution_m`",
     );
     refused(
         ground(GroundOptions {
@@ -323,6 +323,6 @@ fn options_out_of_range_are_refused_by_name() {
             rule: band,
             ..options()
         },
-        "`occupancy_min_z`",
+        "`occupancy_min_z_m`",
     );
 }
