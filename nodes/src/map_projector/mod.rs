@@ -66,6 +66,8 @@ pub struct ProjectorReport {
     pub lost_on_network: u64,
     /// Undecodable samples.
     pub undecodable: u64,
+    /// Transforms that are not finite or do not fit the tree.
+    pub transforms_refused: u64,
 }
 
 /// Messages of one change of the grid.

@@ -293,6 +293,7 @@ impl ComputeState {
             inbox_full: losses.inbox_full(),
             lost_on_network: losses.on_network(),
             undecodable: losses.undecodable(),
+            transforms_refused: self.refused,
         }
     }
 
@@ -317,7 +318,6 @@ impl ComputeState {
         let mut values = report::key_values(&report);
         let differences = self.machine.map_differences();
         values.push(("map_differences".into(), differences.to_string()));
-        values.push(("transforms_refused".into(), self.refused.to_string()));
         self.diagnostics.set("grid", level, message, values);
     }
 
