@@ -15,6 +15,9 @@ const MAX_COLUMN: f64 = (1_u32 << 30) as f64;
 /// column have their mean in it.
 const WINDOW_SIDES: f64 = 0.75;
 
+/// Steps of a cell's edge to which means are rounded: each scan moves them a little, which must not cost anything.
+const MEAN_STEPS: f64 = 64.0;
+
 /// Mean point of a voxel, map frame, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Sample {
@@ -77,11 +80,12 @@ impl Columns {
     pub(super) fn set(&mut self, key: MortonKey, offset_m: Option<Vector3<f64>>) -> Option<Column> {
         let center_m = self.datum_m + self.lattice.center(key.unpack());
         let column = self.column_of(center_m.x, center_m.y)?;
+        let step_m = self.side_m() / MEAN_STEPS;
         let bin = self.bins.entry(column).or_default();
         let found = bin.binary_search_by_key(&key, |sample| sample.key);
         let sample = offset_m.map(|offset_m| Sample {
             key,
-            at_m: center_m + offset_m,
+            at_m: center_m + offset_m.map(|offset_m| (offset_m / step_m).round() * step_m),
         });
         let sample = sample.filter(|sample| sample.at_m.iter().all(|value| value.is_finite()));
         let changed = match (found, sample) {

@@ -2,7 +2,7 @@
 //!
 //! [`Projector`] finds the ground instead of assuming a height for it:
 //!
-//! 1. **Samples.** A voxel is a sample at the mean of its points. The mean of points on a plane is on the plane, so
+//! 1. **Samples.** A voxel is a sample at the mean of its points, rounded to 1/64 of the cell size. The mean of points on a plane is on the plane, so
 //!    heights are finer than the cells. Samples near the centre of a column of the grid are those of the column.
 //! 2. **Spans.** The samples of a column in order of height, separated where the robot fits between two of them.
 //!    The top of a span is a [`Surface`] if its samples surround the centre.
