@@ -5,7 +5,7 @@
 //! 1. **Samples.** A voxel is a sample at the mean of its points, rounded to 1/64 of the cell size. The mean of points on a plane is on the plane, so
 //!    heights are finer than the cells. Samples near the centre of a column of the grid are those of the column.
 //! 2. **Spans.** The samples of a column in order of height, separated where the robot fits between two of them.
-//!    The top of a span is a [`Surface`] if its samples surround the centre.
+//!    The top of a span is a surface if its samples surround the centre.
 //! 3. **Inclination** of a surface along an axis: the smaller one of both sides, so that a step has none.
 //! 4. **Step**: range of the samples about the inclination of the ground beyond. A ramp has none, a curb its height.
 //! 5. **Reach.** Standable surfaces of neighbouring columns are linked where a step is low enough, and the robot
@@ -39,7 +39,6 @@ use crate::lattice::{Lattice, MortonKey};
 pub use flat::FreeCells;
 pub use grid::{Cell, Grid, MAX_GRID_CELLS};
 pub use options::{GroundOptions, ProjectionError, ProjectionRule, ProjectorOptions};
-pub use surfaces::Surface;
 
 /// Projection of a map onto the ground, kept up to date with its changes.
 ///
@@ -126,13 +125,6 @@ impl Projector {
         self.refresh(&ground);
         let reached = Reached::new(&self.states, self.resolution_m(), &ground, robot_m)?;
         Ok(cells::paint(&self.states, &reached, &ground))
-    }
-
-    /// Surfaces above a position of the map frame, lowest first, as of the last [`Projector::grid`].
-    pub fn surfaces_at_m(&self, x_m: f64, y_m: f64) -> &[Surface] {
-        let column = self.columns.column_of(x_m, y_m);
-        let state = column.and_then(|column| self.states.get(&column));
-        state.map_or(&[], |state| &state.surfaces)
     }
 
     /// Brings surfaces and their inclinations up to date where samples changed.

@@ -7,15 +7,15 @@ use super::columns::{Column, Columns};
 
 /// Top of a span of matter in a column, with room for the robot above it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Surface {
+pub(super) struct Surface {
     /// Weighted mean of its samples, map frame, metres; on planes a point of the plane.
-    pub at_m: Vector3<f64>,
+    pub(super) at_m: Vector3<f64>,
     /// Rise per horizontal metre.
-    pub slope: f64,
+    pub(super) slope: f64,
     /// Height of the step at the column, metres.
-    pub step_m: f64,
+    pub(super) step_m: f64,
     /// Whether slope and step are within the limits of the robot.
-    pub is_standable: bool,
+    pub(super) is_standable: bool,
 }
 
 /// What a column with samples has.

@@ -14,8 +14,6 @@ pub use messages::{grid_message, percent};
 pub use options::MapProjectorOptions;
 pub use parameters::declare;
 
-use std::sync::Arc;
-
 use lattice_core::navigation::{Cell, FreeCells, Grid, ProjectionError, ProjectionRule, Projector};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::map_msgs::OccupancyGridUpdate;
@@ -323,15 +321,4 @@ fn offset_m(map: &FollowedMap, state: &VoxelState) -> Vector3<f64> {
 
 fn header_of(map: &FollowedMap) -> Header {
     geometry::header(&map.frame_id, map.stamp_ns)
-}
-
-/// A change as messages to publish.
-impl Projected {
-    /// The grid, if it is one.
-    pub fn into_grid(self) -> Result<Arc<OccupancyGrid>, Vec<Arc<OccupancyGridUpdate>>> {
-        match self {
-            Self::Grid(grid) => Ok(Arc::new(grid)),
-            Self::Updates(updates) => Err(updates.into_iter().map(Arc::new).collect()),
-        }
-    }
 }

@@ -10,7 +10,7 @@ use lattice_msgs::tf2_msgs::TFMessage;
 
 use super::parameters::Settings;
 use super::robot::RobotPosition;
-use super::{MapProjector, MapProjectorOptions, ProjectorReport};
+use super::{MapProjector, MapProjectorOptions, Projected, ProjectorReport};
 use crate::compute::{Compute, Inbox};
 use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
@@ -246,13 +246,13 @@ impl ComputeState {
         if let Some(robot_m) = robot_m {
             self.machine.set_robot(robot_m);
         }
-        match self.machine.take_change().map(super::Projected::into_grid) {
+        match self.machine.take_change() {
             None => {}
-            Some(Ok(grid)) => {
+            Some(Projected::Grid(grid)) => {
                 self.grid_due = None;
                 self.publish_grid(grid);
             }
-            Some(Err(updates)) => {
+            Some(Projected::Updates(updates)) => {
                 for update in updates {
                     if let Err(error) = self.outputs.updates.publish(update) {
                         log::debug!("update not published: {error}");
@@ -273,11 +273,11 @@ impl ComputeState {
     fn publish_whole(&mut self) {
         self.grid_due = None;
         if let Some(grid) = self.machine.whole_grid() {
-            self.publish_grid(Arc::new(grid));
+            self.publish_grid(grid);
         }
     }
 
-    fn publish_grid(&self, grid: Arc<OccupancyGrid>) {
+    fn publish_grid(&self, grid: OccupancyGrid) {
         if let Err(error) = self.outputs.grid.publish(grid) {
             log::debug!("grid not published: {error}");
         }

@@ -11,7 +11,7 @@ use crate::convert::geometry;
 /// Limit of frames whose newest stamps are kept.
 const MAX_FRAMES: usize = 256;
 
-/// Transforms of a robot, and when each was last heard of.
+/// Transforms of a robot, with the newest stamp of each frame.
 pub(super) struct RobotPosition {
     base_frame: String,
     transforms: TransformBuffer,
