@@ -5,6 +5,7 @@
 //! | find the cell of a point | [`lattice::Lattice`] |
 //! | map clouds | [`voxels::VoxelList`]; [`voxels::OccupancyList`] with a bit for each cell |
 //! | find nearest voxels, clearances and paths | [`query::Query`] |
+//! | drive on the ground | [`navigation::Projector`] |
 //! | know free space, or clear what moved | [`raycast::FreeSpaceMap`], [`raycast::RayClearer`] |
 //! | read point records of any layout | [`cloud::CloudLayout`] |
 //! | interpolate poses and frames | [`pose::PoseBuffer`], [`pose::TransformBuffer`] |
@@ -34,6 +35,7 @@ mod kd_tree;
 pub mod lattice;
 #[cfg(feature = "registration")]
 pub mod loop_closure;
+pub mod navigation;
 #[cfg(feature = "registration")]
 pub mod odometry;
 pub mod pose;

@@ -40,6 +40,7 @@ mod interface;
 pub mod lattice;
 pub mod lifecycle_msgs;
 mod livox;
+pub mod map_msgs;
 pub mod nav_msgs;
 pub mod novatel_oem7_msgs;
 pub mod octomap_msgs;

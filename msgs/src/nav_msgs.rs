@@ -1,13 +1,16 @@
-//! Odometry and paths.
+//! Odometry, paths and occupancy grids.
 
 use serde::{Deserialize, Serialize};
 
-use crate::geometry_msgs::{PoseStamped, PoseWithCovariance, TwistWithCovariance};
+use crate::builtin_interfaces::Time;
+use crate::geometry_msgs::{Pose, PoseStamped, PoseWithCovariance, TwistWithCovariance};
 use crate::interface::messages;
 use crate::std_msgs::Header;
 
 messages! {
     "nav_msgs" in "../definitions/nav_msgs/";
+    MapMetaData [Time, Pose];
+    OccupancyGrid [Header, MapMetaData];
     Odometry [Header, PoseWithCovariance, TwistWithCovariance];
     Path [Header, PoseStamped];
 }
@@ -32,4 +35,30 @@ pub struct Path {
     pub header: Header,
     /// The poses.
     pub poses: Vec<PoseStamped>,
+}
+
+/// Place and size of the cells of a grid.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MapMetaData {
+    /// Time at which the map was made.
+    pub map_load_time: Time,
+    /// Edge of a cell, m.
+    pub resolution: f32,
+    /// Cells along x.
+    pub width: u32,
+    /// Cells along y.
+    pub height: u32,
+    /// Corner of cell (0, 0) in the frame of the map.
+    pub origin: Pose,
+}
+
+/// Probabilities of occupancy on a grid of cells.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OccupancyGrid {
+    /// Frame of the map.
+    pub header: Header,
+    /// Place and size of the cells.
+    pub info: MapMetaData,
+    /// Row by row from the origin, x fastest: 0 to 100 percent, -1 unknown.
+    pub data: Vec<i8>,
 }

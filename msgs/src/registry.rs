@@ -4,8 +4,8 @@ use crate::interface::RosMessage;
 use crate::{
     action, action_msgs, builtin_interfaces, calibration, diagnostic_msgs, geographic_msgs,
     geometry_msgs, headset, lattice, lifecycle_msgs, livox_interfaces, livox_ros_driver,
-    livox_ros_driver2, nav_msgs, novatel_oem7_msgs, octomap_msgs, rcl_interfaces, rmw_dds_common,
-    rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs, tf2_msgs,
+    livox_ros_driver2, map_msgs, nav_msgs, novatel_oem7_msgs, octomap_msgs, rcl_interfaces,
+    rmw_dds_common, rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs, tf2_msgs,
     type_description_interfaces, unique_identifier_msgs, vision_msgs, visualization_msgs,
 };
 
@@ -34,6 +34,7 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     livox_interfaces::visit_messages(visitor);
     livox_ros_driver::visit_messages(visitor);
     livox_ros_driver2::visit_messages(visitor);
+    map_msgs::visit_messages(visitor);
     nav_msgs::visit_messages(visitor);
     novatel_oem7_msgs::visit_messages(visitor);
     octomap_msgs::visit_services(visitor);

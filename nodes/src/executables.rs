@@ -14,8 +14,8 @@ use crate::start::{Declare, NodeError, Start};
 #[cfg(feature = "viewer")]
 use crate::viewer_server;
 use crate::{
-    enu_transformer, lattice_mapper, lidar_odometry, map_merger, segmenter, semantic_cloud,
-    semantic_icp_server, voxel_marker_publisher,
+    enu_transformer, lattice_mapper, lidar_odometry, map_merger, map_projector, segmenter,
+    semantic_cloud, semantic_icp_server, voxel_marker_publisher,
 };
 use lattice_runtime::Runtime;
 use lattice_runtime::logging;
@@ -32,6 +32,7 @@ pub const NODES: &[(&str, Start)] = &[
     ("enu_transformer", enu_transformer::node::start),
     ("lattice_mapper", lattice_mapper::node::start),
     ("map_merger", map_merger::node::start),
+    ("map_projector", map_projector::node::start),
     (
         "voxel_marker_publisher",
         voxel_marker_publisher::node::start,
@@ -51,6 +52,7 @@ pub const PARAMETERS: &[(&str, Declare)] = &[
     ("enu_transformer", enu_transformer::declare),
     ("lattice_mapper", lattice_mapper::declare),
     ("map_merger", map_merger::declare),
+    ("map_projector", map_projector::declare),
     ("voxel_marker_publisher", voxel_marker_publisher::declare),
     ("semantic_icp_server", semantic_icp_server::declare),
     #[cfg(feature = "viewer")]

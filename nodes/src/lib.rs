@@ -20,6 +20,7 @@ pub mod map_follower;
 mod map_input;
 pub mod map_merger;
 mod map_output;
+pub mod map_projector;
 #[cfg(feature = "headset")]
 pub mod mesh;
 mod options;

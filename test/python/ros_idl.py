@@ -36,6 +36,26 @@ Odometry = ros(
     pose=PoseWithCovariance,
     twist=TwistWithCovariance,
 )
+MapMetaData = ros(
+    "nav_msgs/msg/MapMetaData",
+    map_load_time=Time,
+    resolution=float32,
+    width=uint32,
+    height=uint32,
+    origin=Pose,
+)
+OccupancyGrid = ros(
+    "nav_msgs/msg/OccupancyGrid", header=Header, info=MapMetaData, data=sequence[int8]
+)
+OccupancyGridUpdate = ros(
+    "map_msgs/msg/OccupancyGridUpdate",
+    header=Header,
+    x=int32,
+    y=int32,
+    width=uint32,
+    height=uint32,
+    data=sequence[int8],
+)
 Transform = ros("geometry_msgs/msg/Transform", translation=Vector3, rotation=Quaternion)
 TransformStamped = ros(
     "geometry_msgs/msg/TransformStamped", header=Header, child_frame_id=str, transform=Transform

@@ -8,3 +8,4 @@ pub mod maps;
 pub mod peer;
 pub mod python;
 pub mod random;
+pub mod static_layer;

@@ -15,7 +15,7 @@ use super::CliResult;
 #[command(disable_help_flag = true)]
 pub struct NodeCommand {
     /// `segmenter`, `semantic_cloud`, `headset_cloud`, `lidar_odometry`, `enu_transformer`, `lattice_mapper`,
-    /// `map_merger`, `voxel_marker_publisher`, `semantic_icp_server`, `viewer_server` or `bag_player`
+    /// `map_merger`, `map_projector`, `voxel_marker_publisher`, `semantic_icp_server`, `viewer_server` or `bag_player`
     name: String,
     /// As for any ROS node: `--ros-args -r from:=to -p name:=value --params-file FILE ...`
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]

@@ -15,6 +15,7 @@ mod network;
 mod octomap;
 mod odometry;
 mod params;
+mod projected_map;
 mod rclpy;
 mod rgbd;
 mod scans;

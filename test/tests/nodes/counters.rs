@@ -25,6 +25,8 @@ use serde_json::Value;
 
 use super::map_follower::scatter;
 
+mod projector;
+
 /// Long enough for a loaded machine; a test that passes does not wait for it.
 const PATIENCE: Duration = Duration::from_secs(60);
 

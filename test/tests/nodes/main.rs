@@ -11,6 +11,7 @@ mod lidar_odometry;
 mod map_follower;
 mod map_labels;
 mod map_merger;
+mod map_projector;
 #[cfg(feature = "onnx")]
 mod segmenter;
 mod semantic_cloud;

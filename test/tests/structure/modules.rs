@@ -11,11 +11,11 @@ use super::source::{code, files, module};
 const LAYERS: [(&str, &str); 3] = [
     (
         "lattice_core/src",
-        "prefetch lattice kd_tree cloud geodesy pose voxels query raycast registration odometry loop_closure",
+        "prefetch lattice kd_tree cloud geodesy pose voxels query raycast navigation registration odometry loop_closure",
     ),
     (
         "nodes/src",
-        "files convert mesh stamps start report compute options cloud_input map_follower map_input map_output camera segmenter semantic_cloud headset_cloud enu_transformer lidar_odometry lattice_mapper map_merger \
+        "files convert mesh stamps start report compute options cloud_input map_follower map_input map_output camera segmenter semantic_cloud headset_cloud enu_transformer lidar_odometry lattice_mapper map_merger map_projector \
          voxel_marker_publisher semantic_icp_server viewer_server replay running executables bag_player bag_recorder",
     ),
     (

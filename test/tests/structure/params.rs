@@ -32,6 +32,7 @@ fn nodes() -> impl Iterator<Item = (&'static str, &'static str, Params)> {
             "headset_cloud" => "headset.yaml",
             "lidar_odometry" => "lidar_odometry.yaml",
             "map_merger" => "map_merger.yaml",
+            "map_projector" => "map_projector.yaml",
             "semantic_icp_server" => "semantic_icp.yaml",
             "viewer_server" => "viewer.yaml",
             _ => "bobcat.yaml",

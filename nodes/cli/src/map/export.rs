@@ -1,10 +1,11 @@
 //! `lattice map export`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use lattice_core::lattice::LatticeKind;
 
+use super::grid::GridOptions;
 use super::read;
 use crate::CliResult;
 #[cfg(feature = "lab")]
@@ -21,8 +22,13 @@ pub struct Export {
     map: PathBuf,
     /// File to write: .ply, .pcd or .xyz (centres), .bt (octree of octomap, of half the cell size) or .png (an image);
     /// PLY without extension
-    #[arg(long, short)]
-    out: PathBuf,
+    #[arg(long, short, required_unless_present = "grid")]
+    out: Option<PathBuf>,
+    /// Occupancy grid to write for Nav2's map_server: a .yaml file, and an image (.pgm) beside it
+    #[arg(long, value_name = "YAML", conflicts_with_all = ["out", "form"])]
+    grid: Option<PathBuf>,
+    #[command(flatten)]
+    robot: GridOptions,
     /// Form to write; a `.png` file is always an image
     #[arg(long = "as", value_enum, default_value = "centers")]
     form: Form,
@@ -75,10 +81,15 @@ enum Target {
 impl Export {
     /// Runs the command.
     pub fn run(self) -> CliResult {
-        let target = self.target()?;
-        let (map, _) = read(&self.map)?;
-        let list = map.into_list(usize::MAX);
-        let out = &self.out;
+        let list = || read(&self.map).map(|(map, _)| map.into_list(usize::MAX));
+        if let Some(grid) = &self.grid {
+            return self.robot.write(&list()?, grid);
+        }
+        let Some(out) = &self.out else {
+            return Err("give --out or --grid".into());
+        };
+        let target = self.target(out)?;
+        let list = list()?;
         match target {
             Target::CentersPly => atomic_write::write(out, |out| write_centers_ply(&list, out)),
             Target::CentersPcd => atomic_write::write(out, |out| write_centers_pcd(&list, out)),
@@ -100,8 +111,8 @@ impl Export {
     }
 
     /// Output format by extension and form; an error if they contradict each other.
-    fn target(&self) -> Result<Target, String> {
-        let extension = self.out.extension().unwrap_or_default().to_string_lossy();
+    fn target(&self, out: &Path) -> Result<Target, String> {
+        let extension = out.extension().unwrap_or_default().to_string_lossy();
         let known = match (extension.to_ascii_lowercase().as_str(), self.form) {
             ("ply" | "", Form::Centers) => return Ok(Target::CentersPly),
             ("pcd", Form::Centers) => return Ok(Target::CentersPcd),
@@ -117,7 +128,7 @@ impl Export {
         };
         let name = self.form.to_possible_value();
         let name = name.as_ref().map_or("this", |value| value.get_name());
-        let out = self.out.display();
+        let out = out.display();
         Err(format!(
             "{out}: --as {name} writes {known}, no .{extension}"
         ))

@@ -188,3 +188,81 @@ fn maps_answer_questions() {
     let nothing = lattice(&["map", "query", &path]);
     assert!(!nothing.status.success());
 }
+
+#[test]
+fn a_grid_is_written_as_map_server_reads_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let side = |i: u16| 0.2 * f32::from(i);
+    let floor = (0..50).flat_map(|x| (0..30).map(move |y| [side(x), side(y), 0.0]));
+    let wall = (0..30).flat_map(|y| (0..10).map(move |z| [5.0, side(y), side(z)]));
+    let points: Vec<_> = floor.chain(wall).collect();
+    let file = save(
+        directory.path(),
+        "site",
+        &map(LatticeKind::Fcc, [0.0; 3], &points),
+    );
+    let yaml = directory.path().join("it's a site.yaml");
+    let yaml_name = yaml.display().to_string();
+    let robot = ["--robot", "1", "1", "0.3"];
+    let written = text(&[&["map", "export", &file, "--grid", &yaml_name], &robot[..]].concat());
+    assert!(written.contains("cells of 0.500 m"), "{written}");
+    let said = std::fs::read_to_string(&yaml).unwrap();
+    let said = |key: &str| {
+        let mut lines = said.lines().filter_map(|line| line.split_once(": "));
+        lines.find(|(name, _)| *name == key).unwrap().1.to_owned()
+    };
+    let number = |key: &str| said(key).parse::<f64>().unwrap();
+    assert_eq!(
+        (said("mode"), said("negate")),
+        ("trinary".to_owned(), "0".to_owned())
+    );
+    assert_eq!(said("image"), "'it''s a site.pgm'");
+    let origin = said("origin");
+    let origin: Vec<f64> = origin
+        .trim_matches(['[', ']'])
+        .split(", ")
+        .map(|v| v.parse().unwrap())
+        .collect();
+    let image = std::fs::read(yaml.with_extension("pgm")).unwrap();
+    let mut lines = image.splitn(4, |byte| *byte == b'\n');
+    assert_eq!(lines.next(), Some(&b"P5"[..]));
+    let size = String::from_utf8(lines.next().unwrap().to_vec()).unwrap();
+    let (width, height) = size.split_once(' ').unwrap();
+    let [width, height] = [width, height].map(|text| text.parse::<usize>().unwrap());
+    assert_eq!(lines.next(), Some(&b"255"[..]));
+    let pixels = lines.next().unwrap();
+    assert_eq!(pixels.len(), width * height);
+    // As map_server takes a pixel: 1 occupied, 0 free, None unknown.
+    let at = |x_m: f64, y_m: f64| {
+        let resolution_m = number("resolution");
+        let [x, y] = [(x_m, 0), (y_m, 1)]
+            .map(|(at_m, axis)| ((at_m - origin[axis]) / resolution_m) as usize);
+        let grey = pixels[(height - 1 - y) * width + x];
+        let occupied = f64::from(255 - grey) / 255.0;
+        match occupied {
+            high if high > number("occupied_thresh") => Some(1),
+            low if low < number("free_thresh") => Some(0),
+            _ => None,
+        }
+    };
+    assert_eq!(
+        [at(2.0, 3.0), at(5.0, 3.0), at(8.0, 3.0)],
+        [Some(0), Some(1), None]
+    );
+    let refused = error(&["map", "export", &file, "--grid", "site.png"]);
+    assert!(refused.contains(".yaml"), "{refused}");
+    let refused = error(&[
+        "map",
+        "export",
+        &file,
+        "--grid",
+        &yaml_name,
+        "--max-step",
+        "0",
+    ]);
+    assert!(refused.contains("0.001..=100"), "{refused}");
+    let refused = error(&[
+        "map", "export", &file, "--grid", &yaml_name, "--robot", "1", "1", "-9",
+    ]);
+    assert!(refused.contains("no free cell"), "{refused}");
+}

@@ -1,7 +1,8 @@
-//! Map export: centres as PLY, PCD or text, a PLY mesh of cells, octrees.
+//! Map export: centres as PLY, PCD or text, a PLY mesh of cells, octrees, occupancy grids.
 
 mod centers;
 mod cloud;
+mod grid;
 mod mesh;
 mod octree;
 pub mod palette;
@@ -10,6 +11,7 @@ mod vertices;
 
 pub use centers::{write_centers_ply, write_centers_xyz};
 pub use cloud::write_labelled_ply;
+pub use grid::{write_grid_pgm, write_grid_yaml};
 pub use mesh::write_mesh_ply;
 pub use octree::{OctreeSummary, write_octree};
 pub use palette::{HeightRange, category_color, color_at};

@@ -166,6 +166,12 @@ pub const RULES: &[(&str, &str, Rule)] = &[
         "lattice calibrate",
         NotHere("calibrate.rs"),
     ),
+    (
+        "docs/navigation.md",
+        "lattice node map_projector",
+        Works("map_projector"),
+    ),
+    ("docs/navigation.md", "lattice map export", Runs("")),
     ("docs/octomap.md", "lattice map export", Runs("")),
     ("docs/octomap.md", "lattice quantize map.bt", Runs("")),
     ("docs/odometry.md", "lattice replay LOG", Runs("--direct")),

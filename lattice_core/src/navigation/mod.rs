@@ -1,0 +1,168 @@
+//! Occupancy grids for robots on the ground, from the occupied voxels of any lattice.
+//!
+//! [`Projector`] finds the ground instead of assuming a height for it:
+//!
+//! 1. **Samples.** A voxel is a sample at the mean of its points, rounded to 1/64 of the cell size. The mean of points on a plane is on the plane, so
+//!    heights are finer than the cells. Samples near the centre of a column of the grid are those of the column.
+//! 2. **Spans.** The samples of a column in order of height, separated where the robot fits between two of them.
+//!    The top of a span is a surface if its samples surround the centre.
+//! 3. **Inclination** of a surface along an axis: the smaller one of both sides, so that a step has none.
+//! 4. **Step**: range of the samples about the inclination of the ground beyond. A ramp has none, a curb its height.
+//! 5. **Reach.** Standable surfaces of neighbouring columns are linked where a step is low enough, and the robot
+//!    reaches all that are linked with the surface below it.
+//! 6. **Cells.** Reached is free. Occupied is matter where nothing is reached, if it is tall, steep, or beside a
+//!    reached column; and the edge of a drop. Between two seen heights whose mean slope is too steep something is
+//!    too steep: a drop-off whose side was never seen. All else is unknown.
+//!
+//! Every figure depends on the voxels alone, so a grid after any history of changes is that of the map as it is.
+
+mod cells;
+mod columns;
+mod flat;
+mod grid;
+mod options;
+mod reach;
+mod surfaces;
+mod terrain;
+
+use std::collections::hash_map::Entry;
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use self::columns::{Column, Columns};
+use self::reach::Reached;
+use self::surfaces::ColumnState;
+use crate::lattice::{Lattice, MortonKey};
+
+pub use flat::FreeCells;
+pub use grid::{Cell, Grid, MAX_GRID_CELLS};
+pub use options::{GroundOptions, ProjectionError, ProjectionRule, ProjectorOptions};
+
+/// Projection of a map onto the ground, kept up to date with its changes.
+///
+/// ```
+/// use lattice_core::lattice::{Lattice, LatticeKind};
+/// use lattice_core::nalgebra::Vector3;
+/// use lattice_core::navigation::{Cell, Projector, ProjectorOptions};
+/// use lattice_core::cloud::Cloud;
+/// use lattice_core::voxels::{VoxelList, VoxelStore};
+///
+/// // A floor of 6 m by 6 m with a wall across.
+/// let side = (0..120).map(|i| 0.05 * f64::from(i) + 0.025);
+/// let floor = side.clone().flat_map(|x| side.clone().map(move |y| Vector3::new(x, y, 0.0)));
+/// let wall = side.clone().flat_map(|y| side.clone().map(move |z| Vector3::new(3.0, y, z)));
+/// let points_m: Vec<_> = floor.chain(wall).collect();
+/// let lattice = Lattice::new(LatticeKind::Cubic, 0.001)?;
+/// let mut list = VoxelList::new(lattice.clone(), Vector3::zeros(), 1_000_000)?;
+/// list.insert(&Cloud::from_points(0, Vector3::zeros(), &points_m));
+///
+/// let mut projector = Projector::new(&lattice, list.datum_m(), ProjectorOptions::default())?;
+/// for (key, voxel) in list.sorted() {
+///     projector.set(key, Some(voxel.mean_offset_m().into()));
+/// }
+/// let grid = projector.grid(Some(Vector3::new(1.0, 1.0, 0.3)), None)?;
+/// assert_eq!(grid.at_m(1.0, 3.0), Cell::Free);
+/// assert_eq!(grid.at_m(3.0, 3.0), Cell::Occupied);
+/// assert_eq!(grid.at_m(5.0, 3.0), Cell::Unknown, "not reached");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone)]
+pub struct Projector {
+    columns: Columns,
+    options: ProjectorOptions,
+    states: FxHashMap<Column, ColumnState>,
+    /// Columns with changed samples since the last grid.
+    changed: FxHashSet<Column>,
+}
+
+impl Projector {
+    /// Creates the projection of an empty map whose keys count from `datum_m` (map frame, metres).
+    pub fn new(
+        lattice: &Lattice,
+        datum_m: Vector3<f64>,
+        options: ProjectorOptions,
+    ) -> Result<Projector, ProjectionError> {
+        options.check(lattice)?;
+        Ok(Projector {
+            columns: Columns::new(lattice, datum_m, options.resolution_of(lattice)),
+            options,
+            states: FxHashMap::default(),
+            changed: FxHashSet::default(),
+        })
+    }
+
+    /// Edge of the cells, metres: exactly a number of single precision, as messages have it.
+    pub fn resolution_m(&self) -> f64 {
+        self.columns.resolution_m
+    }
+
+    /// Sets a voxel by the mean of its points minus its centre (map frame axes, metres), or removes it.
+    ///
+    /// The mean is zero where a map keeps no points. Voxels beyond 2^30 columns are ignored.
+    pub fn set(&mut self, key: MortonKey, mean_offset_m: Option<Vector3<f64>>) {
+        if let Some(column) = self.columns.set(key, mean_offset_m) {
+            self.changed.insert(column);
+        }
+    }
+
+    /// Grid of the map as it is, for a robot at `robot_m` (map frame, metres).
+    ///
+    /// Without a position the ground is the lowest surface at least half as large as the largest one. `free` is for
+    /// [`ProjectionRule::Flat`], which knows no free cell without it.
+    pub fn grid(
+        &mut self,
+        robot_m: Option<Vector3<f64>>,
+        free: Option<&FreeCells>,
+    ) -> Result<Grid, ProjectionError> {
+        let ground = match self.options.rule {
+            ProjectionRule::Flat { min_z_m, max_z_m } => {
+                return flat::grid(&self.columns, [min_z_m, max_z_m], free);
+            }
+            ProjectionRule::Ground(ground) => ground,
+        };
+        self.refresh(&ground);
+        let reached = Reached::new(&self.states, self.resolution_m(), &ground, robot_m)?;
+        Ok(cells::paint(&self.states, &reached, &ground))
+    }
+
+    /// Brings surfaces and their inclinations up to date where samples changed.
+    fn refresh(&mut self, ground: &GroundOptions) {
+        let changed = std::mem::take(&mut self.changed);
+        let seen = columns::around(&changed, self.columns.reach());
+        let states: Vec<_> = (seen.par_iter())
+            .map(|column| (*column, surfaces::of_column(&self.columns, *column, ground)))
+            .collect();
+        for (column, state) in states {
+            match (state, self.states.entry(column)) {
+                (Some(state), Entry::Occupied(mut entry)) => drop(entry.insert(state)),
+                (Some(state), Entry::Vacant(entry)) => drop(entry.insert(state)),
+                (None, Entry::Occupied(entry)) => drop(entry.remove()),
+                (None, Entry::Vacant(_)) => {}
+            }
+        }
+        let stride = self.columns.stride();
+        let judged = columns::around(&changed, self.columns.reach() + terrain::REACH * stride);
+        let judged: Vec<_> = (judged.par_iter())
+            .filter(|column| self.states.contains_key(*column))
+            .map(|column| {
+                let standable = terrain::standable(&self.columns, &self.states, *column, ground);
+                (*column, standable)
+            })
+            .collect();
+        for (column, standable) in judged {
+            let surfaces = self
+                .states
+                .get_mut(&column)
+                .map(|state| &mut state.surfaces);
+            for (surface, terrain) in surfaces.into_iter().flatten().zip(standable) {
+                (surface.slope, surface.step_m) = (terrain.slope, terrain.step_m);
+                surface.is_standable = terrain.is_standable;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

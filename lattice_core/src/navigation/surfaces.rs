@@ -1,0 +1,129 @@
+//! Surfaces of a column that a robot may stand on.
+
+use nalgebra::Vector3;
+
+use super::GroundOptions;
+use super::columns::{Column, Columns};
+
+/// Top of a span of matter in a column, with room for the robot above it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Surface {
+    /// Weighted mean of its samples, map frame, metres; on planes a point of the plane.
+    pub(super) at_m: Vector3<f64>,
+    /// Rise per horizontal metre.
+    pub(super) slope: f64,
+    /// Height of the step at the column, metres.
+    pub(super) step_m: f64,
+    /// Whether slope and step are within the limits of the robot.
+    pub(super) is_standable: bool,
+}
+
+/// What a column with samples has.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct ColumnState {
+    /// Surfaces, lowest first.
+    pub(super) surfaces: Vec<Surface>,
+    /// Lowest and highest sample of each span that is taller than a step on a slope, metres.
+    pub(super) tall_m: Vec<[f64; 2]>,
+}
+
+/// Maximum range of heights of the samples of one surface, metres: a step on the steepest slope.
+fn layer_m(columns: &Columns, ground: &GroundOptions) -> f64 {
+    ground.max_link_m(2.0 * columns.window_m)
+}
+
+/// Samples of a window in spans, lowest first: the robot fits between two of them.
+///
+/// Half a cell is added to its height, as a sample is the mean of a cell that reaches further down.
+fn spans<'a>(
+    columns: &Columns,
+    window: &'a [Vector3<f64>],
+    ground: &GroundOptions,
+) -> impl Iterator<Item = &'a [Vector3<f64>]> {
+    let room_m = ground.robot_height_m + 0.5 * columns.side_m();
+    window.chunk_by(move |below, above| above.z - below.z < room_m)
+}
+
+/// Samples of a span within a step of its top that no other sample covers: the underside of a deck is none of them.
+fn layer(columns: &Columns, span: &[Vector3<f64>], ground: &GroundOptions) -> Vec<Vector3<f64>> {
+    let top_m = span.last().map_or(0.0, |sample| sample.z);
+    let low_m = top_m - layer_m(columns, ground);
+    let begin = span.partition_point(|sample| sample.z < low_m);
+    let near = span.get(begin..).unwrap_or_default();
+    let half_m = 0.5 * columns.side_m();
+    let covers = |a: &Vector3<f64>, b: &Vector3<f64>| (a.xy() - b.xy()).amax() < half_m;
+    let higher = |i: usize| near.get(i + 1..).unwrap_or_default();
+    let is_covered = |i: usize, sample| higher(i).iter().any(|above| covers(above, sample));
+    let open = near
+        .iter()
+        .enumerate()
+        .filter(|(i, sample)| !is_covered(*i, sample));
+    open.map(|(_, sample)| *sample).collect()
+}
+
+/// Whether the centre of the column is among samples: none of eight half planes is without any.
+fn surrounds(layer: &[Vector3<f64>]) -> bool {
+    const HALF_PLANES: [[f64; 2]; 8] = [
+        [1.0, 0.0],
+        [1.0, 1.0],
+        [0.0, 1.0],
+        [-1.0, 1.0],
+        [-1.0, 0.0],
+        [-1.0, -1.0],
+        [0.0, -1.0],
+        [1.0, -1.0],
+    ];
+    HALF_PLANES.iter().all(|[x, y]| {
+        layer
+            .iter()
+            .any(|sample| x * sample.x + y * sample.y >= 0.0)
+    })
+}
+
+/// Layers of samples that are surfaces, in the order of [`ColumnState::surfaces`].
+pub(super) fn layers(
+    columns: &Columns,
+    window: &[Vector3<f64>],
+    ground: &GroundOptions,
+) -> impl Iterator<Item = Vec<Vector3<f64>>> {
+    let layers = spans(columns, window, ground).map(|span| layer(columns, span, ground));
+    layers.filter(|layer| surrounds(layer))
+}
+
+/// State of a column; `None` without samples.
+pub(super) fn of_column(
+    columns: &Columns,
+    column: Column,
+    ground: &GroundOptions,
+) -> Option<ColumnState> {
+    let window = columns.window(column);
+    let tall_m = layer_m(columns, ground);
+    let surface = |layer: Vec<Vector3<f64>>| Surface {
+        at_m: mean(columns, column, &layer),
+        slope: 0.0,
+        step_m: 0.0,
+        is_standable: false,
+    };
+    let tall = |span: &[Vector3<f64>]| match span {
+        [low, .., high] if high.z - low.z > tall_m => Some([low.z, high.z]),
+        _ => None,
+    };
+    (!window.is_empty()).then(|| ColumnState {
+        surfaces: layers(columns, &window, ground).map(surface).collect(),
+        tall_m: spans(columns, &window, ground).filter_map(tall).collect(),
+    })
+}
+
+/// Mean of samples, weighted by their distance from the border of the window.
+fn mean(columns: &Columns, column: Column, layer: &[Vector3<f64>]) -> Vector3<f64> {
+    let [x_m, y_m] = columns.center_m(column);
+    // Samples on the border count a little, so that the sum is not 0.
+    let weight = |offset_m: f64| 1.0 + 1e-6 - offset_m.abs() / columns.window_m;
+    let (mut sum, mut total) = (Vector3::zeros(), 0.0);
+    for sample in layer {
+        let weight = weight(sample.x) * weight(sample.y);
+        sum += weight * sample;
+        total += weight;
+    }
+    sum / total + Vector3::new(x_m, y_m, 0.0)
+}

@@ -1,0 +1,333 @@
+//! ROS node around [`MapProjector`].
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::map_msgs::OccupancyGridUpdate;
+use lattice_msgs::nav_msgs::OccupancyGrid;
+use lattice_msgs::tf2_msgs::TFMessage;
+
+use super::parameters::Settings;
+use super::robot::RobotPosition;
+use super::{MapProjector, MapProjectorOptions, Projected, ProjectorReport};
+use crate::compute::{Compute, Inbox};
+use crate::map_input::{MapLosses, MapRequests};
+use crate::report;
+use crate::start::{Finish, NodeError, handed_over, open_params};
+use lattice_runtime::logging::Throttle;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{
+    Diagnostics, Level, Node, Publisher, Runtime, RuntimeError, Subscription, SubscriptionExecutor,
+    Undecoded,
+};
+
+/// Time without a subscriber after which the map is no longer followed.
+const IDLE: Duration = Duration::from_secs(10);
+/// Longest wait for readers at the end.
+const FLUSH: Duration = Duration::from_secs(1);
+
+/// Event for the compute thread.
+enum Event {
+    /// How the thread opens and closes its subscriptions, by demand.
+    Inputs(Box<Inputs>),
+    Map(Undecoded<LatticeMap>),
+    Update(Undecoded<LatticeMapUpdate>),
+    Free(Undecoded<LatticeMap>),
+    Transforms(Arc<TFMessage>, bool),
+    Joined,
+    Project,
+    Settings(Box<MapProjectorOptions>, Duration),
+    Finish,
+}
+
+/// Starts the node.
+pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
+    let node = runtime.node(name)?;
+    let params = node.params();
+    let settings = Settings::from_params(params)?;
+    let outputs = Outputs {
+        grid: node.publisher("projected_map", Qos::LATCHED)?,
+        updates: node.publisher("projected_map_updates", Qos::DEFAULT)?,
+    };
+    let losses = MapLosses::default();
+    let requests = MapRequests::new(&node, &settings.mapper, &losses)?;
+    let mut state = ComputeState {
+        requests,
+        robot: RobotPosition::new(settings.base_frame),
+        needs_free: settings.projector.needs_free(),
+        machine: MapProjector::new(settings.projector),
+        outputs: outputs.clone(),
+        diagnostics: node.diagnostics(),
+        seconds: Throttle::new(Duration::from_secs(1)),
+        inputs: None,
+        wanted: Instant::now(),
+        grid_period: settings.grid_period,
+        grid_due: None,
+        refused: 0,
+        report_file: settings.report_file,
+    };
+    let compute = Compute::spawn(
+        name,
+        settings.limits,
+        runtime.shutdown_handle(),
+        move |event| state.on(event),
+    )?;
+    let inbox = compute.inbox();
+    let inputs = Inputs {
+        node: node.clone(),
+        inbox: inbox.clone(),
+        losses,
+        open: Vec::new(),
+    };
+    handed_over(inbox.send(Event::Inputs(Box::new(inputs)), 0))?;
+    let joined = inbox.clone();
+    outputs.grid.on_subscriber_joined(move || {
+        let _ = joined.send(Event::Joined, 0);
+    });
+    let projects = inbox.clone();
+    let period = runtime.timer(settings.update_period, move || {
+        let _ = projects.send(Event::Project, 0);
+    });
+    open_params(params, move |params| {
+        let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
+        let event = Event::Settings(Box::new(settings.projector), settings.grid_period);
+        handed_over(inbox.send(event, 0))?;
+        period.set(settings.update_period);
+        Ok(())
+    });
+    Ok(Box::new(move || {
+        compute.finish_with(Event::Finish);
+        Box::new(())
+    }))
+}
+
+/// The topics of the node.
+#[derive(Clone)]
+struct Outputs {
+    grid: Publisher<OccupancyGrid>,
+    updates: Publisher<OccupancyGridUpdate>,
+}
+
+/// Subscriptions that are open while somebody subscribes to the grid.
+struct Inputs {
+    node: Node,
+    inbox: Inbox<Event>,
+    losses: MapLosses,
+    open: Vec<Subscription>,
+}
+
+impl Inputs {
+    fn open(&mut self, with_free: bool) -> Result<(), RuntimeError> {
+        let mut open =
+            Vec::from(
+                self.losses
+                    .subscribe(&self.node, &self.inbox, Event::Map, Event::Update)?,
+            );
+        if with_free {
+            let bytes = |map: &Undecoded<LatticeMap>| map.bytes(|map| map.keys.len());
+            let handler = self
+                .inbox
+                .counting(&self.losses.at_inbox, Event::Free, bytes);
+            let shared = SubscriptionExecutor::Shared;
+            open.push(
+                self.node
+                    .subscribe_undecoded("free", Qos::MAP, shared, handler)?,
+            );
+        }
+        for (topic, qos, is_static) in [
+            ("/tf", Qos::TF, false),
+            ("/tf_static", Qos::TF_STATIC_LISTENER, true),
+        ] {
+            let inbox = self.inbox.clone();
+            // Transforms count no bytes: a map must not keep them out.
+            let handler = move |message: Arc<TFMessage>| {
+                let _ = inbox.send(Event::Transforms(message, is_static), 0);
+            };
+            open.push(
+                self.node
+                    .subscribe(topic, qos, SubscriptionExecutor::Shared, handler)?,
+            );
+        }
+        self.open = open;
+        Ok(())
+    }
+}
+
+/// State of the compute thread.
+struct ComputeState {
+    requests: MapRequests,
+    machine: MapProjector,
+    robot: RobotPosition,
+    needs_free: bool,
+    outputs: Outputs,
+    diagnostics: Diagnostics,
+    seconds: Throttle,
+    inputs: Option<Inputs>,
+    /// Last time at which somebody subscribed to the grid.
+    wanted: Instant,
+    grid_period: Duration,
+    /// Time of the next whole grid, if one is due for a subscriber without updates.
+    grid_due: Option<Instant>,
+    /// Transforms rejected.
+    refused: u64,
+    report_file: String,
+}
+
+impl ComputeState {
+    fn on(&mut self, event: Event) {
+        match event {
+            Event::Inputs(inputs) => self.inputs = Some(*inputs),
+            Event::Map(chunk) => {
+                let result = chunk.decode().map(|chunk| self.machine.on_map(&chunk));
+                self.requests.followed(result);
+            }
+            Event::Update(chunk) => {
+                let result = chunk.decode().map(|chunk| self.machine.on_update(&chunk));
+                self.requests.followed(result);
+            }
+            Event::Free(chunk) => {
+                // Free cells are published anew by themselves.
+                let _ = chunk.decode().map(|chunk| self.machine.on_free(&chunk));
+            }
+            Event::Transforms(message, is_static) => {
+                self.refused += self.robot.on_tf(&message, is_static);
+            }
+            Event::Joined => {
+                self.follow_by_demand();
+                self.grid_due = Some(Instant::now());
+                self.project();
+            }
+            Event::Project => {
+                self.follow_by_demand();
+                self.requests.make_good();
+                if self.seconds.check().is_some() && self.machine.check_keyframe_timeout() {
+                    self.requests.ask_for_keyframe();
+                }
+                self.project();
+                self.diagnose();
+            }
+            Event::Settings(options, grid_period) => {
+                self.machine.set_options(*options);
+                self.grid_period = grid_period;
+            }
+            Event::Finish => self.finish(),
+        }
+    }
+
+    /// Subscribes to the map while somebody subscribes to the grid.
+    fn follow_by_demand(&mut self) {
+        let Some(inputs) = &mut self.inputs else {
+            return;
+        };
+        let subscribers =
+            self.outputs.grid.subscriber_count() + self.outputs.updates.subscriber_count();
+        if subscribers > 0 {
+            self.wanted = Instant::now();
+            if inputs.open.is_empty() {
+                match inputs.open(self.needs_free) {
+                    // Within a process no keyframe comes by itself.
+                    Ok(()) => self.requests.ask_for_keyframe(),
+                    Err(error) => log::warn!("the map is not followed: {error}"),
+                }
+            }
+        } else if !inputs.open.is_empty() && self.wanted.elapsed() > IDLE {
+            inputs.open.clear();
+            self.machine.clear();
+        }
+    }
+
+    /// Publishes what changed.
+    fn project(&mut self) {
+        let robot_m = self
+            .machine
+            .map_frame()
+            .and_then(|frame| self.robot.in_frame(frame));
+        if let Some(robot_m) = robot_m {
+            self.machine.set_robot(robot_m);
+        }
+        match self.machine.take_change() {
+            None => {}
+            Some(Projected::Grid(grid)) => {
+                self.grid_due = None;
+                self.publish_grid(grid);
+            }
+            Some(Projected::Updates(updates)) => {
+                for update in updates {
+                    if let Err(error) = self.outputs.updates.publish(update) {
+                        log::debug!("update not published: {error}");
+                    }
+                }
+                let takes_no_updates =
+                    self.outputs.grid.subscriber_count() > self.outputs.updates.subscriber_count();
+                if takes_no_updates && self.grid_due.is_none() {
+                    self.grid_due = Some(Instant::now() + self.grid_period);
+                }
+            }
+        }
+        if self.grid_due.is_some_and(|due| due <= Instant::now()) {
+            self.publish_whole();
+        }
+    }
+
+    fn publish_whole(&mut self) {
+        self.grid_due = None;
+        if let Some(grid) = self.machine.whole_grid() {
+            self.publish_grid(grid);
+        }
+    }
+
+    fn publish_grid(&self, grid: OccupancyGrid) {
+        if let Err(error) = self.outputs.grid.publish(grid) {
+            log::debug!("grid not published: {error}");
+        }
+    }
+
+    fn report(&self) -> ProjectorReport {
+        let losses = self.requests.losses();
+        ProjectorReport {
+            counts: self.machine.counts().clone(),
+            voxels: self.machine.voxels(),
+            cells: self.machine.cells(),
+            grids_not_published: self.outputs.grid.dropped() + self.outputs.updates.dropped(),
+            inbox_full: losses.inbox_full(),
+            lost_on_network: losses.on_network(),
+            undecodable: losses.undecodable(),
+            transforms_refused: self.refused,
+        }
+    }
+
+    fn diagnose(&self) {
+        let report = self.report();
+        let is_followed = self
+            .inputs
+            .as_ref()
+            .is_some_and(|inputs| !inputs.open.is_empty());
+        let (level, message) = match (self.machine.error(), report.counts.messages_refused) {
+            _ if !is_followed => (Level::Ok, "nobody subscribes to projected_map".to_owned()),
+            (Some(error), _) => (Level::Error, error.to_string()),
+            (None, 0) if report.counts.messages_in == 0 => (Level::Warn, "no map yet".to_owned()),
+            (None, 0) if report.cells == [0; 3] => (Level::Warn, "no grid yet".to_owned()),
+            (None, 0) if report.cells.first() == Some(&0) => {
+                let text = "no free cell: no ground below base_frame, or limits are too tight";
+                (Level::Warn, text.to_owned())
+            }
+            (None, 0) => (Level::Ok, "OK".to_owned()),
+            (None, refused) => (Level::Warn, format!("{refused} messages rejected")),
+        };
+        let mut values = report::key_values(&report);
+        let differences = self.machine.map_differences();
+        values.push(("map_differences".into(), differences.to_string()));
+        self.diagnostics.set("grid", level, message, values);
+    }
+
+    fn finish(&mut self) {
+        self.project();
+        self.outputs.grid.flush(FLUSH);
+        self.outputs.updates.flush(FLUSH);
+        self.inputs = None;
+        if let Err(error) = report::write(&self.report_file, &self.report(), &self.diagnostics) {
+            log::error!("{error}");
+        }
+    }
+}
