@@ -23,7 +23,7 @@ pub(super) fn paint(
         let cell = match reached.drawn.get(i) {
             Some(Some(_)) if is_edge(states, reached, *column, i, ground) => Cell::Occupied,
             Some(Some(_)) => Cell::Free,
-            _ => of_matter(state, reached, i),
+            _ => of_matter(state, reached, i, ground),
         };
         if let Some(place) = grid.cells.get_mut(i) {
             *place = cell;
@@ -33,16 +33,20 @@ pub(super) fn paint(
     grid
 }
 
-/// Cell of a column where nothing is reached.
-fn of_matter(state: &ColumnState, reached: &Reached, i: usize) -> Cell {
-    let is_drawn = |i: usize| matches!(reached.drawn.get(i), Some(Some(_)));
-    let is_beside = || {
-        EDGES
-            .into_iter()
-            .any(|step| beside(&reached.grid, i, step).is_some_and(is_drawn))
-    };
-    let is_steep = state.surfaces.iter().any(|surface| !surface.is_standable);
-    match !state.tall_m.is_empty() || is_steep || !state.surfaces.is_empty() && is_beside() {
+/// Cell of a column where nothing is reached. What is above a robot on the next cell says nothing of the ground.
+fn of_matter(state: &ColumnState, reached: &Reached, i: usize, ground: &GroundOptions) -> Cell {
+    let beside = EDGES
+        .into_iter()
+        .filter_map(|step| beside(&reached.grid, i, step));
+    let beside = beside.filter_map(|i| reached.drawn.get(i).copied().flatten());
+    let floor_m = beside.map(|at_m| at_m.z).reduce(f64::max);
+    let is_low = |z_m: f64| floor_m.is_none_or(|floor_m| z_m - floor_m <= ground.robot_height_m);
+    let is_tall = state.tall_m.iter().any(|[low_m, _]| is_low(*low_m));
+    let mut low = state
+        .surfaces
+        .iter()
+        .filter(|surface| is_low(surface.at_m.z));
+    match is_tall || low.any(|surface| floor_m.is_some() || !surface.is_standable) {
         true => Cell::Occupied,
         false => Cell::Unknown,
     }
@@ -93,7 +97,11 @@ fn paint_drops(
         let line = |k: usize| begin + k * stride;
         let mut known: Option<usize> = None;
         for k in 0..length {
-            if !lowest_m.get(line(k)).is_some_and(|z| z.is_finite()) {
+            let height_m = |k: usize| lowest_m.get(line(k)).copied().unwrap_or(f64::NAN);
+            let is_drawn = matches!(reached.drawn.get(line(k)), Some(Some(_)));
+            // A ceiling over ground that was not seen.
+            let is_above = |before: usize| height_m(k) - height_m(before) > ground.robot_height_m;
+            if height_m(k).is_nan() || !is_drawn && known.is_some_and(is_above) {
                 continue;
             }
             if let Some(before) = known.replace(k)

@@ -15,6 +15,12 @@ const MAX_COLUMN: f64 = (1_u32 << 30) as f64;
 /// column have their mean in it.
 const WINDOW_SIDES: f64 = 0.75;
 
+/// Shortest stride, metres: over less, an inclination is the noise of the points.
+const MIN_STRIDE_M: f64 = 0.1;
+
+/// Longest stride, columns: bounds the work where cells are millimetres.
+const MAX_STRIDE: i32 = 16;
+
 /// Steps of a cell's edge to which means are rounded: each scan moves them a little, which must not cost anything.
 const MEAN_STEPS: f64 = 64.0;
 
@@ -71,9 +77,10 @@ impl Columns {
         (reach_m / self.resolution_m + 0.5).floor() as i32
     }
 
-    /// Columns on each side that one cell of the lattice blurs.
+    /// Columns over which inclinations are judged: at least those that one cell of the lattice blurs.
     pub(super) fn stride(&self) -> i32 {
-        ((self.side_m() / self.resolution_m).round() as i32).max(1)
+        let stride_m = self.side_m().max(MIN_STRIDE_M);
+        ((stride_m / self.resolution_m).round() as i32).clamp(1, MAX_STRIDE)
     }
 
     /// Sets or removes the sample of a voxel; returns its column, if it changed.

@@ -293,6 +293,24 @@ fn what_was_never_seen_is_unknown() {
 }
 
 #[test]
+fn ground_that_was_not_seen_below_a_ceiling_is_unknown() {
+    let world = World::default()
+        .floor([0.0, 0.0], [6.0, 1.0], 0.0)
+        .floor([0.0, 1.0], [2.0, 3.0], 0.0)
+        .floor([3.0, 1.0], [6.0, 3.0], 0.0)
+        .floor([0.0, 3.0], [6.0, 4.0], 0.0)
+        .floor([0.0, 0.0], [6.0, 4.0], 2.6);
+    for kind in KINDS {
+        let mapped = Mapped::new(&world, kind, 0.1, 3);
+        let grid = mapped.grid(options(), [1.0, 1.0, 0.2]);
+        let p = mapped.map_from_world * nalgebra::Point3::new(2.5, 2.0, 0.0);
+        assert_eq!(grid.at_m(p.x, p.y), Cell::Unknown);
+        assert_eq!(grid.count(Cell::Occupied), 0, "{kind}");
+        assert!(grid.count(Cell::Free) > 1800, "{kind}");
+    }
+}
+
+#[test]
 fn options_out_of_range_are_refused_by_name() {
     let lattice = Lattice::new(LatticeKind::Fcc, 0.001).unwrap();
     let refused = |options: ProjectorOptions, part: &str| {
