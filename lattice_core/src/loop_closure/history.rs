@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 
 use crate::lattice::{Lattice, LatticeError, LatticeIndex, LatticeKind};
 
-/// Cells per radius of a look-up: 1.3 leaves 87 cells with FCC.
+/// Cells per radius: 1.3 leaves 87 FCC cells to visit.
 const CELLS_PER_RADIUS: f64 = 1.3;
 
 /// Positions by the cell of a lattice in which they lie.
@@ -41,12 +41,12 @@ impl PlaceHistory {
         })
     }
 
-    /// Radius of a look-up, m.
+    /// Radius of all queries, m.
     pub fn radius_m(&self) -> f64 {
         self.radius_m
     }
 
-    /// Cells that a look-up visits.
+    /// Cells that a query visits.
     pub fn cells_visited(&self) -> usize {
         self.steps.len()
     }

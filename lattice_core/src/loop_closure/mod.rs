@@ -28,7 +28,7 @@ use verify::register_segments;
 
 /// Distance between segments that share enough surfaces, in root mean squares of the distances of their points.
 const REACH_ARMS: f64 = 1.0;
-/// Drift that a look-up allows for, as a part of that distance: it visits more cells with more.
+/// Drift that a query of the history allows for, as a part of that distance.
 const DRIFT_PART: f64 = 1.0;
 /// Factor of the distance from which the history is made anew with a larger radius.
 const WIDER: f64 = 1.5;

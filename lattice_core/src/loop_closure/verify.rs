@@ -11,7 +11,7 @@ use crate::registration::{
     Verdict, register_global,
 };
 
-/// Points of a cloud, at most.
+/// Limit of the points of a cloud.
 const MAX_POINTS: usize = 200_000;
 /// Least standard deviation of the tilt between two segments, rad: that of a registration.
 const TILT_SIGMA_RAD: f64 = 0.02;
