@@ -325,8 +325,8 @@ fn drive(submap_of: impl Fn(u32) -> u32) -> (LoopCloser, f64, f64) {
     }
     closer.finish().unwrap();
     // Between both ends of the last loop.
-    let closed = closer.attempts().iter().filter(|attempt| attempt.is_closed);
-    let Some(ends_ns) = closed.last().map(|attempt| attempt.stamps_ns) else {
+    let mut closed = closer.attempts().iter().filter(|attempt| attempt.is_closed);
+    let Some(ends_ns) = closed.next_back().map(|attempt| attempt.stamps_ns) else {
         return (closer, 0.0, f64::INFINITY);
     };
     let ends = ends_ns.map(|stamp_ns| {
