@@ -361,7 +361,10 @@ mod tests {
         assert_eq!((trial.ok, trial.wrong), (0, 0), "{trial:?}");
         assert_eq!(trial.weak + trial.lost, trial.scans);
         let again = run_odometry(folder.path(), &scenes, 1, &mut |_, _| {}).unwrap();
-        assert_eq!(again, trials);
+        // Not driven again: times are those of the file, whose last digit the parser of JSON may change.
+        assert_eq!(again.len(), 1);
+        assert!((again[0].ms - trial.ms).abs() < 1e-9 * trial.ms);
+        assert_eq!((again[0].lost, again[0].scans), (trial.lost, trial.scans));
         assert!(markdown(&odometry_report(&trials)).contains("| yard | 1 |"));
     }
 }
