@@ -52,7 +52,7 @@ fn of_matter(state: &ColumnState, reached: &Reached, i: usize, ground: &GroundOp
     }
 }
 
-/// Whether the surface of a cell ends beside a lower one, or at a wall that goes down.
+/// Tests whether the surface of a cell ends beside a lower one, or at a wall that goes down.
 fn is_edge(
     states: &FxHashMap<Column, ColumnState>,
     reached: &Reached,

@@ -14,11 +14,11 @@ pub(super) struct Surface {
     pub(super) slope: f64,
     /// Height of the step at the column, metres.
     pub(super) step_m: f64,
-    /// Whether slope and step are within the limits of the robot.
+    /// True if slope and step are within the limits of the robot.
     pub(super) is_standable: bool,
 }
 
-/// What a column with samples has.
+/// Surfaces and matter of a column with samples.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ColumnState {
     /// Surfaces, lowest first.
@@ -61,7 +61,7 @@ fn layer(columns: &Columns, span: &[Vector3<f64>], ground: &GroundOptions) -> Ve
     open.map(|(_, sample)| *sample).collect()
 }
 
-/// Whether the centre of the column is among samples: none of eight half planes is without any.
+/// Tests whether the centre of the column is among samples: none of eight half planes is without any.
 fn surrounds(layer: &[Vector3<f64>]) -> bool {
     const HALF_PLANES: [[f64; 2]; 8] = [
         [1.0, 0.0],

@@ -86,7 +86,7 @@ fn curbs_up_to_the_limit() {
     }
 }
 
-/// Whether a robot gets from one side of a curb to the other, as a share of several places.
+/// Share of several places at which a robot gets from one side of a curb to the other.
 fn crossed(kind: LatticeKind, side_m: f64, curb_m: f64) -> f64 {
     let world = World::default()
         .floor([0.0, 0.0], [4.0, 4.0], 0.0)

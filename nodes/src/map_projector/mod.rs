@@ -83,7 +83,7 @@ pub struct MapProjector {
     follower: MapFollower,
     free: MapFollower,
     projector: Option<Projector>,
-    /// Whether the map has changed since the last grid.
+    /// True if the map has changed since the last grid.
     changed: bool,
     robot_m: Option<Vector3<f64>>,
     grid: Option<Grid>,

@@ -29,7 +29,7 @@ const FLUSH: Duration = Duration::from_secs(1);
 
 /// Event for the compute thread.
 enum Event {
-    /// How the thread opens and closes its subscriptions, by demand.
+    /// Means of the thread to open and close its subscriptions by demand.
     Inputs(Box<Inputs>),
     Map(Undecoded<LatticeMap>),
     Update(Undecoded<LatticeMapUpdate>),

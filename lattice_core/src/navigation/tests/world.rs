@@ -12,7 +12,7 @@ const DENSITY: f64 = 2500.0;
 /// Largest error of a point, metres.
 const NOISE_M: f64 = 0.01;
 
-/// What a robot finds at a position.
+/// Truth of a position for a robot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Truth {
     Free,
