@@ -14,6 +14,7 @@ const MOVING_MS = 200;
 // Window width below which the panel is at the bottom, px.
 const NARROW = 640;
 const PANEL = 280;
+const LOOP_INK = [0.1, 0.65, 0.3, 1];
 export const ROBOT_INK = [1, 0.78, 0.36, 1];
 
 export class Drawing {
@@ -143,12 +144,17 @@ export class Drawing {
   }
 
   drawRobot() {
-    const { gl, camera, scene, state: { path, robot } } = this;
+    const { gl, camera, scene, state: { drive, loops, robot } } = this;
+    const path = drive.length > 1 ? [...drive, robot.position] : this.state.path;
     // On top, so that they are not hidden by the map.
     gl.disable(gl.DEPTH_TEST);
     if (path.length > 1) {
       scene.set("path", path.flatMap((p) => sub(p, path[0])));
       scene.draw("path", gl.LINE_STRIP, { origin: path[0], ink: [...colourOf("--accent"), 0.9] });
+    }
+    if (loops.length > 1) {
+      scene.set("loops", loops.flatMap((p) => sub(p, loops[0])));
+      scene.draw("loops", gl.LINES, { origin: loops[0], ink: LOOP_INK });
     }
     const size = Math.max(1.6, camera.distance * 0.03);
     scene.draw("robot", gl.TRIANGLES, { origin: robot.position, turn: turned(robot.rotation, size), ink: ROBOT_INK });

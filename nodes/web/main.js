@@ -43,7 +43,7 @@ const scene = new Scene(gl);
 let transforms = new Transforms();
 const state = {
   open: false, session: null, closedAt: null, file: false, thin: false, live: false, lattice: null, frame: "map", size: 0, complete: false, sequence: null, changedAt: null, heardAt: Date.now(),
-  mode: "height", heights: [0, 1], labels: new Map(), names: new Map(), robot: null, path: [], headset: null,
+  mode: "height", heights: [0, 1], labels: new Map(), names: new Map(), robot: null, path: [], drive: [], loops: [], headset: null,
   clouds: new Map(), measuring: false, measured: [], chosen: null, shown: { cells: true, robot: true, grid: true, headset: true },
   scansOn: new Set(), channels: [], published: null, calibrated: false, problems: [], frames: 0,
 };
@@ -68,7 +68,7 @@ const handlers = {
       // A restarted server: the state of robots is unknown.
       transforms = new Transforms();
       slice.follow(null);
-      Object.assign(state, { session, robot: null, headset: null, calibrated: false, path: [], names: new Map() });
+      Object.assign(state, { session, robot: null, headset: null, calibrated: false, path: [], drive: [], loops: [], names: new Map() });
     }
     Object.assign(state, { open: true, file, thin, published: null });
     services.offered = [];
@@ -126,6 +126,15 @@ const handlers = {
     headset.showVerdict(said);
     state.calibrated = true;
     layers.show();
+    redraw();
+  },
+  // Corrected by loops, where odometry closes them.
+  drive({ said }) {
+    state.drive = said.frame === state.frame ? said.points : [];
+    redraw();
+  },
+  loops({ said }) {
+    state.loops = said.frame === state.frame ? said.points : [];
     redraw();
   },
   names({ said }) {

@@ -104,6 +104,36 @@ export function calibration(bytes) {
   return result;
 }
 
+// Poses of a drive as positions in a frame.
+export function drive(bytes) {
+  const r = new Reader(bytes);
+  const { frame } = header(r);
+  const points = r.list((r) => {
+    header(r);
+    return pose(r).position;
+  }, 68);
+  return { frame, points };
+}
+
+// Ends of the lines of the first marker, in its frame.
+export function loops(bytes) {
+  const r = new Reader(bytes);
+  if (r.u32() === 0) return { frame: "", points: [] };
+  const { frame } = header(r);
+  r.string();
+  const [, type] = [r.i32(), r.i32()];
+  const action = r.i32();
+  pose(r);
+  vector(r);
+  for (let left = 6; left > 0; left--) r.u32();
+  r.bool();
+  const points = r.list(vector, 24);
+  return { frame, points: type === LINE_LIST && action === ADD ? points : [] };
+}
+
+const LINE_LIST = 5;
+const ADD = 0;
+
 // Names of labels.
 export function names(bytes) {
   const r = new Reader(bytes);

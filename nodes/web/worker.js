@@ -24,7 +24,7 @@ let nextSubscription = 1;
 let published = new Map();
 let changed = false;
 const rates = new Map();
-const wanted = new Set(["tf", "static", "map", "updates", "diagnostics", "calibration", "names"]);
+const wanted = new Set(["tf", "static", "map", "updates", "diagnostics", "calibration", "names", "drive", "loops"]);
 
 // Decoder of each channel, by type and topic suffix.
 const KINDS = [
@@ -36,6 +36,8 @@ const KINDS = [
   ["diagnostics", "diagnostic_msgs/msg/DiagnosticArray", /./],
   ["calibration", "lattice_msgs/msg/CalibrationResult", /./],
   ["names", "vision_msgs/msg/LabelInfo", /(^|\/)label_info$/],
+  ["drive", "nav_msgs/msg/Path", /(^|\/)path$/],
+  ["loops", "visualization_msgs/msg/MarkerArray", /(^|\/)loop_closures$/],
   ["centers", "sensor_msgs/msg/PointCloud2", /map_centers$/],
   ["cloud", "sensor_msgs/msg/PointCloud2", /./],
 ];
@@ -143,6 +145,8 @@ function onData(bytes) {
     case "diagnostics":
     case "calibration":
     case "names":
+    case "drive":
+    case "loops":
       postMessage({ type: channel.kind, said: messages[channel.kind](cdr) });
       break;
     case "centers":

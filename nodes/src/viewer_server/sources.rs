@@ -9,6 +9,7 @@ use lattice_msgs::cdr::CdrError;
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::lattice::LatticeMap;
+use lattice_msgs::nav_msgs::Path;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::LabelInfo;
@@ -136,6 +137,9 @@ impl Sources {
         )?;
         builder.add::<CalibrationResult>("calibration", shared(Qos::LATCHED), 1, When::Always)?;
         builder.add::<LabelInfo>("label_info", shared(Qos::LATCHED), 1, When::Always)?;
+        // Of lidar odometry, whose loops move the whole path.
+        builder.add::<Path>("path", shared(Qos::LATCHED), 1, When::OnDemand)?;
+        builder.add::<MarkerArray>("loop_closures", shared(Qos::LATCHED), 1, When::OnDemand)?;
         builder.add::<PointCloud2>("map_centers", dedicated(Qos::MARKERS), 1, When::OnDemand)?;
         builder.add::<MarkerArray>(
             "voxel_markers",

@@ -10,9 +10,11 @@ use lattice_msgs::cdr;
 use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use lattice_msgs::geometry_msgs::{Pose, Quaternion, TransformStamped, Vector3};
 use lattice_msgs::lattice::{LatticeInfo, LatticeMap};
+use lattice_msgs::nav_msgs::Path;
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
+use lattice_msgs::visualization_msgs::MarkerArray;
 use lattice_nodes::viewer_server::{Broadcaster, Class, Entry, RequestAuth, Server};
 use serde::Serialize;
 use serde_bytes::ByteBuf;
@@ -53,6 +55,8 @@ pub struct Stage {
     free: u32,
     label_info: u32,
     transforms: u32,
+    drive: u32,
+    loops: u32,
     diagnostics: Option<u32>,
     /// Address of the page.
     pub url: String,
@@ -78,6 +82,8 @@ impl Stage {
         let free = broadcaster.channel::<LatticeMap>("/free", one, true);
         let label_info = broadcaster.channel::<LabelInfo>("/label_info", one, true);
         let transforms = broadcaster.channel::<TFMessage>("/tf", one, true);
+        let drive = broadcaster.channel::<Path>("/path", one, true);
+        let loops = broadcaster.channel::<MarkerArray>("/loop_closures", one, true);
         let states = || {
             broadcaster.channel::<DiagnosticArray>(
                 "/diagnostics",
@@ -97,6 +103,8 @@ impl Stage {
             free,
             label_info,
             transforms,
+            drive,
+            loops,
             diagnostics,
             url: format!("http://{}", server.address()),
             _server: server,
@@ -127,6 +135,14 @@ impl Stage {
         };
         self.broadcaster
             .offer(self.transforms, cdr::to_vec(&message).unwrap());
+    }
+
+    /// Publishes the path of a drive and the lines of its loops.
+    pub fn drive(&self, path: &Path, loops: &MarkerArray) {
+        let drive = cdr::to_vec(path).unwrap();
+        self.broadcaster.offer(self.drive, drive);
+        let loops = cdr::to_vec(loops).unwrap();
+        self.broadcaster.offer(self.loops, loops);
     }
 
     /// States a task of a node, with its values.
