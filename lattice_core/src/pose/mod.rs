@@ -4,6 +4,7 @@
 //! samples and interpolate between them (linear and slerp); else they return a reason. Their memory is bounded.
 //! [`Axes`] converts from headsets and cameras to the axes of ROS.
 
+mod attitude_check;
 mod axes;
 mod buffer;
 mod frame_name;
@@ -13,6 +14,7 @@ mod tf_error;
 mod track;
 mod transforms;
 
+pub use attitude_check::{AttitudeCheck, AttitudeConvention, AttitudeFinding};
 pub use axes::{Axes, UnknownAxes};
 pub use buffer::{PoseBuffer, PoseBufferOptions, PoseMiss, PushOutcome, StampedPose};
 pub use interpolate::interpolate;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CloudNote, Refusal, most_frequent};
+use super::{AttitudeReport, CloudNote, Refusal, most_frequent};
 
 /// Counters of one transformer. Every cloud ends in exactly one of the `clouds_` counters
 /// other than `clouds_in`, or is still queued.
@@ -89,6 +89,9 @@ pub struct TransformerReport {
     /// Notes on corrected clouds, and on the source of point times.
     #[serde(default)]
     pub notes: Vec<CloudNote>,
+    /// Attitudes that contradict the way of the machine.
+    #[serde(default)]
+    pub attitude: Option<AttitudeReport>,
 }
 
 impl TransformerCounts {

@@ -5,6 +5,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use lattice_core::geodesy::{EnuFrame, Geodetic, enu_from_flu, utc_ns_from_gps};
+use lattice_core::pose::AttitudeConvention;
 use lattice_msgs::RosMessage;
 use lattice_msgs::geometry_msgs::{Pose, PoseStamped, PoseWithCovarianceStamped};
 use lattice_msgs::nav_msgs::Odometry;
@@ -113,6 +114,10 @@ pub struct InsOptions {
     pub lever_arm_m: Option<Vector3<f64>>,
     /// Boresight: rotation of the INS in the machine's frame; `None`: from its frame on tf.
     pub base_from_ins: Option<UnitQuaternion<f64>>,
+    /// Convention of quaternions.
+    pub orientation: AttitudeConvention,
+    /// Yaw added to attitudes, counterclockwise, rad.
+    pub yaw_offset_rad: f64,
     /// Frame of the machine: odometry of this frame needs no mount.
     pub base_frame: String,
     /// Origin of the map; `None`: the first good fix.
@@ -128,6 +133,30 @@ pub struct InsOptions {
     pub settle_ns: i64,
     /// Forward step of stamps beyond which three must agree, ns.
     pub ahead_ns: i64,
+}
+
+impl InsOptions {
+    /// An attitude of the messages as `enu_from_flu`; those of the usual convention keep their bits.
+    fn enu(&self, attitude: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+        let attitude = match self.orientation {
+            AttitudeConvention::Enu => attitude,
+            other => other.to_enu(&attitude),
+        };
+        match self.yaw_offset_rad == 0.0 {
+            true => attitude,
+            false => UnitQuaternion::from_euler_angles(0.0, 0.0, self.yaw_offset_rad) * attitude,
+        }
+    }
+
+    /// Parameter that is set and that the source of poses ignores.
+    pub fn ignored(&self) -> Option<&'static str> {
+        let is_tf = self.source == InsSource::Tf;
+        let has_azimuth = matches!(self.source, InsSource::Inspva | InsSource::Inspvax);
+        if self.orientation != AttitudeConvention::Enu && (is_tf || has_azimuth) {
+            return Some("ins.orientation");
+        }
+        (self.yaw_offset_rad != 0.0 && is_tf).then_some("ins.yaw_offset_deg")
+    }
 }
 
 /// An INS message.
@@ -212,7 +241,7 @@ impl InsDecoder {
         match message {
             InsMessage::Inspva(m) => {
                 let place = self.geodetic(m.latitude, m.longitude, m.height)?;
-                let attitude = enu_from_flu(m.roll, m.pitch, m.azimuth);
+                let attitude = self.novatel_attitude([m.roll, m.pitch, m.azimuth]);
                 self.novatel_pose(&m.header, &m.nov_header, &m.status, &place, &attitude)
             }
             InsMessage::Inspvax(m) => {
@@ -221,7 +250,7 @@ impl InsDecoder {
                     HeightDatum::Geoid => f64::from(m.undulation),
                 };
                 let place = self.geodetic(m.latitude, m.longitude, m.height + undulation_m)?;
-                let attitude = enu_from_flu(m.roll, m.pitch, m.azimuth);
+                let attitude = self.novatel_attitude([m.roll, m.pitch, m.azimuth]);
                 self.novatel_pose(&m.header, &m.nov_header, &m.ins_status, &place, &attitude)
             }
             InsMessage::Fix(m) => self.on_fix(m),
@@ -232,11 +261,15 @@ impl InsDecoder {
                     true => Body::Base,
                     false => Body::ins(child),
                 };
-                one(&m.header, &m.pose.pose, body)
+                self.one(&m.header, &m.pose.pose, body)
             }
-            InsMessage::Pose(m) => one(&m.header, &m.pose, Body::ins("")),
-            InsMessage::PoseWithCovariance(m) => one(&m.header, &m.pose.pose, Body::ins("")),
+            InsMessage::Pose(m) => self.one(&m.header, &m.pose, Body::ins("")),
+            InsMessage::PoseWithCovariance(m) => self.one(&m.header, &m.pose.pose, Body::ins("")),
         }
+    }
+
+    fn novatel_attitude(&self, [roll, pitch, azimuth]: [f64; 3]) -> UnitQuaternion<f64> {
+        self.options.enu(enu_from_flu(roll, pitch, azimuth))
     }
 
     fn novatel_pose(
@@ -321,23 +354,25 @@ impl InsDecoder {
         let rotation = geometry::rotation_from(&imu.orientation).ok_or(InsRefusal::Pose)?;
         self.pairing.push_attitude(Attitude {
             stamp_ns: imu.header.stamp.to_ns(),
-            level_from_imu: rotation,
+            level_from_imu: self.options.enu(rotation),
             imu: Body::ins(&imu.header.frame_id),
         });
         Ok(self.pairing.poses(&mut self.frame))
     }
-}
 
-/// Pose of a body in the header's frame.
-fn one(header: &Header, pose: &Pose, body: Body) -> Result<Vec<BodyPose>, InsRefusal> {
-    let reference = header.frame_id.trim_start_matches('/');
-    Ok(vec![BodyPose {
-        stamp_ns: header.stamp.to_ns(),
-        reference: (!reference.is_empty()).then(|| reference.into()),
-        pose: geometry::isometry_from_pose(pose).ok_or(InsRefusal::Pose)?,
-        position_of: body.clone(),
-        attitude_of: body,
-    }])
+    /// Pose of a body in the header's frame.
+    fn one(&self, header: &Header, pose: &Pose, body: Body) -> Result<Vec<BodyPose>, InsRefusal> {
+        let reference = header.frame_id.trim_start_matches('/');
+        let mut pose = geometry::isometry_from_pose(pose).ok_or(InsRefusal::Pose)?;
+        pose.rotation = self.options.enu(pose.rotation);
+        Ok(vec![BodyPose {
+            stamp_ns: header.stamp.to_ns(),
+            reference: (!reference.is_empty()).then(|| reference.into()),
+            pose,
+            position_of: body.clone(),
+            attitude_of: body,
+        }])
+    }
 }
 
 fn good(status: &InertialSolutionStatus) -> Result<(), InsRefusal> {

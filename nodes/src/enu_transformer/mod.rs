@@ -2,6 +2,7 @@
 //!
 //! [`EnuTransformer`] is a state machine without I/O; [`node`] runs it behind DDS.
 
+mod attitude;
 mod cloud_clocks;
 mod cloud_notes;
 mod cloud_times;
@@ -23,6 +24,7 @@ mod transforms;
 mod verdict;
 mod waiting;
 
+pub use attitude::AttitudeReport;
 pub use cloud_notes::CloudNote;
 pub(crate) use cloud_notes::CloudNotes;
 pub(crate) use cloud_times::CloudTimes;
@@ -46,6 +48,7 @@ use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use nalgebra::Isometry3;
 
+use self::attitude::Attitudes;
 use self::cloud_clocks::CloudClocks;
 use self::drops::Drop;
 use self::ins::{InsDecoder, InsMessage, InsSource};
@@ -85,6 +88,7 @@ pub struct EnuTransformer {
     options: TransformerOptions,
     ins: InsDecoder,
     poses: PoseBuffer,
+    attitudes: Attitudes,
     /// Order and speed of the poses of the machine in the map.
     order: StampOrder<StampedPose>,
     speed: SpeedGate<StampedPose>,
@@ -141,6 +145,7 @@ impl EnuTransformer {
             notes: CloudNotes::default(),
             ins: InsDecoder::new(ins),
             poses,
+            attitudes: Attitudes::default(),
             mounts,
             waiting: Waiting::new(options.max_waiting_clouds, options.max_waiting_bytes),
             waiting_poses: VecDeque::new(),

@@ -47,6 +47,14 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
     let settings = Settings::from_params(params)?;
+    // Not a part of the declaration: a replay reads it before it knows the source.
+    if let Some(name) = settings.transformer.ins.ignored() {
+        let problem = format!(
+            "`ins.source: {}` ignores it",
+            settings.transformer.ins.source
+        );
+        return Err(params.invalid(name, problem).into());
+    }
     let taken = settings.taken();
     let source = settings.transformer.ins.source;
     let guard = TfGuard::new(remedy(&settings.transformer));
@@ -304,6 +312,7 @@ impl ComputeState {
             clouds_not_published: self.outputs.points.dropped(),
             refusals: self.machine.refusals().all().to_vec(),
             notes: self.machine.notes().to_vec(),
+            attitude: self.machine.attitude(),
         }
     }
 
@@ -314,6 +323,12 @@ impl ComputeState {
         let dropped = dropped.join(", ");
         let (level, message) = match report.cause_of_nothing() {
             Some(cause) => (Level::Warn, cause),
+            None if report.attitude.is_some() => {
+                let attitude = report.attitude.clone();
+                let is_wrong = attitude.as_ref().is_some_and(|found| found.is_impossible);
+                let level = if is_wrong { Level::Error } else { Level::Warn };
+                (level, attitude.map_or(String::new(), |found| found.text))
+            }
             None if dropped.is_empty() => (Level::Ok, "transforming".to_owned()),
             None => {
                 let text = most_frequent(&report.refusals, "clouds_");

@@ -2,6 +2,7 @@
 
 use lattice_core::cloud::{TimeOptions, TimeReference, TimeUnit};
 use lattice_core::geodesy::Geodetic;
+use lattice_core::pose::AttitudeConvention;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::ins::{HeightDatum, InsOptions, InsSource, InsStamp};
@@ -79,6 +80,8 @@ impl TransformerOptions {
                 inspvax_height: HeightDatum::Geoid,
                 lever_arm_m: None,
                 base_from_ins: None,
+                orientation: AttitudeConvention::Enu,
+                yaw_offset_rad: 0.0,
                 origin: None,
                 base_frame: "base_link".into(),
                 max_imu_gap_s: 0.1,
@@ -194,6 +197,8 @@ fn ins_options(params: &Params, defaults: InsOptions) -> Result<InsOptions, Para
     let lever_arm_m = Vector3::from(triple(params, "ins.lever_arm_m")?);
     let [roll, pitch, yaw] = triple(params, "ins.boresight_rpy_rad")?;
     let base_from_ins = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+    let conventions = AttitudeConvention::ALL.map(|one| (one.name(), one));
+    let yaw_offset_deg = params.f64_in("ins.yaw_offset_deg", 0.0, -360.0..=360.0)?;
     let leap_seconds = params.i64("ins.leap_seconds", i64::from(defaults.leap_seconds))?;
     let max_speed_m_per_s =
         not_negative(params, "ins.max_speed_m_per_s", defaults.max_speed_m_per_s)?;
@@ -210,6 +215,8 @@ fn ins_options(params: &Params, defaults: InsOptions) -> Result<InsOptions, Para
         base_from_ins: params
             .is_given("ins.boresight_rpy_rad")
             .then_some(base_from_ins),
+        orientation: one_of(params, "ins.orientation", &conventions)?,
+        yaw_offset_rad: yaw_offset_deg.to_radians(),
         origin: is_fixed.then_some(place).transpose()?,
         max_imu_gap_s: not_negative(params, "ins.max_imu_gap_s", defaults.max_imu_gap_s)?,
         max_fix_gap_s: params.f64_in("ins.max_fix_gap_s", defaults.max_fix_gap_s, 0.0..=60.0)?,

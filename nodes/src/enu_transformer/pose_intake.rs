@@ -101,6 +101,7 @@ impl EnuTransformer {
         }
         if is_newest {
             self.clocks.on_step();
+            self.attitudes.on_pose(&pose, &self.options);
             self.announce_pose(&pose, out);
         }
     }

@@ -122,6 +122,7 @@ impl Pipeline {
                 undecodable: self.undecodable,
                 refusals: self.transformer.refusals().all().to_vec(),
                 notes: self.transformer.notes().to_vec(),
+                attitude: self.transformer.attitude(),
                 ..TransformerReport::default()
             },
             lattices,

@@ -88,6 +88,13 @@ impl RunReport {
         Err(NothingMapped { cause })
     }
 
+    /// Attitudes with which the map is wrong, and the parameter that mends them.
+    pub fn wrong_attitude(&self) -> Option<&str> {
+        let attitude = self.transformer.attitude.as_ref();
+        let attitude = attitude.filter(|attitude| attitude.is_impossible);
+        attitude.map(|attitude| attitude.text.as_str())
+    }
+
     /// One line per loss, empty when nothing was lost.
     pub fn losses(&self) -> Vec<String> {
         let mut lines = Vec::new();

@@ -80,6 +80,9 @@ pub struct Replay {
     /// Folder of tables to add the map to, for `lattice fleet`; needs --direct and the program lattice-fleet
     #[arg(long, value_name = "DIR")]
     pub out_table: Option<PathBuf>,
+    /// Map although the attitudes contradict the way of the machine
+    #[arg(long)]
+    pub trust_attitude: bool,
     /// Print the report as JSON
     #[arg(long)]
     pub json: bool,
@@ -119,7 +122,17 @@ impl Replay {
         } else {
             println!("{report}");
         }
-        Ok(report.check()?)
+        report.check()?;
+        if let Some(text) = self.refused(&report) {
+            let kept = "no map was written; --trust-attitude writes it";
+            return Err(format!("{text} ({kept})").into());
+        }
+        Ok(())
+    }
+
+    /// Reason for which the map of a report is not written.
+    fn refused<'a>(&self, report: &'a RunReport) -> Option<&'a str> {
+        report.wrong_attitude().filter(|_| !self.trust_attitude)
     }
 
     /// Runs the replay and returns its report; the map may be empty.
@@ -178,6 +191,9 @@ impl Replay {
         transformer.map_frame_is_given = true;
         transformer.base_frame.clone_from(&plan.base_frame);
         transformer.ins.base_frame.clone_from(&plan.base_frame);
+        if let Some(name) = transformer.ins.ignored() {
+            return Err(format!("parameter {name}: the source {} ignores it", plan.source).into());
+        }
         let mut maps = self.maps()?;
         for map in &mut maps {
             map.map_frame.clone_from(&plan.map_frame);
@@ -194,6 +210,9 @@ impl Replay {
             replay::run(bag, plan, &self.slice(), &mut pipeline, &source, tell)
         })?;
         progress.done();
+        if self.refused(&report).is_some() {
+            return Ok(report);
+        }
         if let Some(path) = &self.map_out {
             write_maps(path, &pipeline)?;
         }

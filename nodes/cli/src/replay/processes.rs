@@ -114,7 +114,8 @@ impl DdsReplay<'_> {
 
     /// Moves the maps saved by the mappers to the user's paths.
     fn keep_maps(&self, scratch: &Path, report: &RunReport) -> CliResult {
-        let Some(path) = &self.options.map_out else {
+        let path = self.options.map_out.as_ref();
+        let Some(path) = path.filter(|_| self.options.refused(report).is_none()) else {
             return Ok(());
         };
         let several = self.lattices.len() > 1;

@@ -1,6 +1,7 @@
 //! The `lattice` command as a user runs it.
 #![allow(clippy::unwrap_used)]
 
+mod attitude;
 mod bag_info;
 mod beside_nav2;
 mod browser;
