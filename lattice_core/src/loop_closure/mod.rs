@@ -5,6 +5,7 @@
 //! explains closes the loop, and [`PoseGraph`] moves all poses to the least squares of motions and loops. A loop that the
 //! others contradict is withdrawn.
 
+mod corrections;
 mod history;
 mod pose_graph;
 mod segment;
@@ -14,16 +15,16 @@ mod verify;
 
 use std::collections::BTreeSet;
 
-use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Vector6};
 
+pub use corrections::{Anchor, Corrections};
 pub use history::PlaceHistory;
 pub use pose_graph::{LoopEdge, PoseGraph};
+pub use segment::{Segment, SegmentCutter};
 
 use crate::lattice::LatticeError;
-use crate::odometry::{ScanResult, Verdict};
 use crate::pose::se3;
 use crate::registration::Verdict as RegistrationVerdict;
-use segment::{GrowingSegment, Segment};
 use verify::register_segments;
 
 /// Distance between segments that share enough surfaces, in root mean squares of the distances of their points.
@@ -71,73 +72,22 @@ pub struct LoopAttempt {
     pub from_to: Isometry3<f64>,
 }
 
-/// Finds loops among the scans of a drive, and corrects its poses.
+/// Finds loops among the segments of a drive, and corrects its poses.
+#[derive(Default)]
 pub struct LoopCloser {
     segments: Vec<Segment>,
-    growing: Option<GrowingSegment>,
     graph: PoseGraph,
     history: Option<PlaceHistory>,
-    path_m: f64,
-    last: Option<(u32, Vector3<f64>)>,
     attempts: Vec<LoopAttempt>,
     /// Loops between submaps that are not joined, one of which cannot be held against motions: another has to agree.
     alone: Vec<LoopEdge>,
 }
 
 impl LoopCloser {
-    /// A drive without scans.
-    pub fn new() -> LoopCloser {
-        LoopCloser {
-            segments: Vec::new(),
-            growing: None,
-            graph: PoseGraph::default(),
-            history: None,
-            path_m: 0.0,
-            last: None,
-            attempts: Vec::new(),
-            alone: Vec::new(),
-        }
-    }
-
-    /// Takes a scan with its centroids, metres in the frame of the base at its pose, of cells of `side_m`; gives the loop that was
-    /// tried, if a segment was completed by it and lies near another. Scans that are not `OK` are passed over.
+    /// Takes the next segment of a drive; gives the loop that was tried, if the segment lies near another.
     ///
-    /// Fails if `side_m` gives no lattice.
-    pub fn add(
-        &mut self,
-        scan: &ScanResult,
-        centroids_m: &[Vector3<f64>],
-        side_m: f64,
-    ) -> Result<Option<&LoopAttempt>, LatticeError> {
-        if scan.verdict != Verdict::Ok {
-            return Ok(None);
-        }
-        let place_m = scan.odom_from_base.translation.vector;
-        let last = self.last.replace((scan.submap, place_m));
-        self.path_m += last
-            .filter(|(submap, _)| *submap == scan.submap)
-            .map_or(0.0, |(_, last_m)| (place_m - last_m).norm());
-        if let Some(growing) = self.growing.as_mut().filter(|one| !one.is_ended_by(scan)) {
-            growing.add(scan, centroids_m);
-            return Ok(None);
-        }
-        let ended = self.growing.take();
-        self.growing = Some(GrowingSegment::new(scan, centroids_m, side_m, self.path_m)?);
-        match ended {
-            Some(ended) => self.complete(ended.finish()),
-            None => Ok(None),
-        }
-    }
-
-    /// Completes the last segment; gives the loop that was tried, if it lies near another.
-    pub fn finish(&mut self) -> Result<Option<&LoopAttempt>, LatticeError> {
-        match self.growing.take() {
-            Some(last) => self.complete(last.finish()),
-            None => Ok(None),
-        }
-    }
-
-    fn complete(&mut self, segment: Segment) -> Result<Option<&LoopAttempt>, LatticeError> {
+    /// Fails if its distances give no lattice of places.
+    pub fn add(&mut self, segment: Segment) -> Result<Option<&LoopAttempt>, LatticeError> {
         match self.segments.last() {
             None => self.graph.push(segment.odom_from_anchor, Matrix6::zeros()),
             Some(before) => {
@@ -337,39 +287,45 @@ impl LoopCloser {
         &self.attempts
     }
 
-    /// Pose of a scan in the map: that by odometry with the corrections of the segments before and after it.
-    pub fn map_from_base(&self, scan: &ScanResult) -> Isometry3<f64> {
-        self.map_from_odom(scan.submap, scan.end_ns) * scan.odom_from_base
+    /// Poses of the first scans of the segments in the map, corrected.
+    pub fn map_from_anchors(&self) -> &[Isometry3<f64>] {
+        self.graph.poses()
     }
 
-    /// The correction of poses by odometry at a time.
-    pub fn map_from_odom(&self, submap: u32, stamp_ns: i64) -> Isometry3<f64> {
-        let of = |number: usize| -> Option<(i64, Isometry3<f64>)> {
-            let (segment, pose) = (self.segments.get(number)?, self.graph.poses().get(number)?);
-            let correction = pose * segment.odom_from_anchor.inverse();
-            (segment.submap == submap).then_some((segment.first_ns, correction))
+    /// The corrections of poses by odometry, as they are now.
+    pub fn corrections(&self) -> Corrections {
+        let anchor = |stamp_ns: i64, (segment, pose): (&Segment, &Isometry3<f64>)| Anchor {
+            stamp_ns,
+            submap: segment.submap,
+            map_from_odom: pose * segment.odom_from_anchor.inverse(),
         };
-        let key = |segment: &Segment| (segment.submap, segment.first_ns);
-        let next = self
-            .segments
-            .partition_point(|segment| key(segment) <= (submap, stamp_ns));
-        match (next.checked_sub(1).and_then(of), of(next)) {
-            (Some((from_ns, from)), Some((to_ns, to))) => {
-                let span_ns = to_ns.saturating_sub(from_ns).max(1) as f64;
-                let part = stamp_ns.saturating_sub(from_ns) as f64 / span_ns;
-                let twist = se3::log(&(from.inverse() * to));
-                from * se3::exp(&(twist * part.clamp(0.0, 1.0)))
-            }
-            (Some((_, only)), None) | (None, Some((_, only))) => only,
-            (None, None) => Isometry3::identity(),
+        let mut anchors: Vec<Anchor> = Vec::new();
+        let mut end_ns = 0;
+        for (segment, pose) in self.segments.iter().zip(self.graph.poses()) {
+            let last = anchors.last().cloned();
+            let follows = last
+                .as_ref()
+                .is_some_and(|one| one.submap == segment.submap);
+            let stamp_ns = match (follows, &last) {
+                (true, _) => segment.first_ns,
+                (false, None) => segment.begin_ns,
+                // Clouds whose stamps are not those of their points have room.
+                (false, Some(_)) => middle_ns(end_ns, segment.begin_ns),
+            };
+            anchors.extend(last.filter(|_| !follows).map(|last| Anchor {
+                stamp_ns: end_ns,
+                ..last
+            }));
+            anchors.push(anchor(stamp_ns, (segment, pose)));
+            end_ns = segment.end_ns;
         }
+        Corrections::new(anchors)
     }
 }
 
-impl Default for LoopCloser {
-    fn default() -> Self {
-        LoopCloser::new()
-    }
+/// The middle of two times, ns.
+pub fn middle_ns(from_ns: i64, to_ns: i64) -> i64 {
+    from_ns.saturating_add(to_ns.saturating_sub(from_ns) / 2)
 }
 
 /// Motion between the anchors of two segments, with the covariance of its twist in the frame of the first one.

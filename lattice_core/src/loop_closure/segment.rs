@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 
 use crate::lattice::{Lattice, LatticeError, LatticeKind};
-use crate::odometry::{MomentMap, ScanResult};
+use crate::odometry::{MomentMap, ScanResult, Verdict};
 
 /// Length of a segment in root mean squares of the distances of its points: neighbours see the same surfaces.
 const LENGTH_ARMS: f64 = 0.5;
@@ -12,28 +12,32 @@ const MAX_CELLS: usize = 30_000;
 
 /// The surfaces that the scans of a stretch have seen, in the frame of the base at the first of them.
 #[derive(Clone, Debug)]
-pub(super) struct Segment {
+pub struct Segment {
     /// Number of the submap of the odometry.
-    pub submap: u32,
+    pub(super) submap: u32,
+    /// Time of the first point of the first scan, ns.
+    pub(super) begin_ns: i64,
     /// Time of the pose of the first scan, ns.
-    pub first_ns: i64,
+    pub(super) first_ns: i64,
+    /// Time of the pose of the last scan, ns.
+    pub(super) end_ns: i64,
     /// Length of the path up to the first scan, m.
-    pub path_m: f64,
+    pub(super) path_m: f64,
     /// Pose of the first scan by odometry.
-    pub odom_from_anchor: Isometry3<f64>,
+    pub(super) odom_from_anchor: Isometry3<f64>,
     /// Covariance of the twist of that pose in `odom` since the beginning of the submap.
-    pub drift: Matrix6<f64>,
+    pub(super) drift: Matrix6<f64>,
     /// Centroids of cells, metres, in the frame of the anchor.
-    pub points_m: Vec<[f32; 3]>,
+    pub(super) points_m: Vec<[f32; 3]>,
     /// Root mean square of the distances of the points of its scans, m.
-    pub arm_m: f64,
+    pub(super) arm_m: f64,
     /// Side of the cells, m.
-    pub side_m: f64,
+    pub(super) side_m: f64,
 }
 
 impl Segment {
     /// The points in the frame to which a pose of the anchor leads.
-    pub fn points_at<'a>(
+    pub(super) fn points_at<'a>(
         &'a self,
         pose: &'a Isometry3<f64>,
     ) -> impl Iterator<Item = Vector3<f64>> + 'a {
@@ -42,8 +46,50 @@ impl Segment {
     }
 }
 
+/// Cuts the scans of a drive into segments.
+#[derive(Default)]
+pub struct SegmentCutter {
+    growing: Option<GrowingSegment>,
+    path_m: f64,
+    last: Option<(u32, Vector3<f64>)>,
+}
+
+impl SegmentCutter {
+    /// Takes a scan with its centroids, metres in the frame of the base at its pose, of cells of `side_m`; gives the segment that
+    /// ends before it. Scans that are not `OK` are passed over.
+    ///
+    /// Fails if `side_m` gives no lattice.
+    pub fn add(
+        &mut self,
+        scan: &ScanResult,
+        centroids_m: &[Vector3<f64>],
+        side_m: f64,
+    ) -> Result<Option<Segment>, LatticeError> {
+        if scan.verdict != Verdict::Ok {
+            return Ok(None);
+        }
+        let place_m = scan.odom_from_base.translation.vector;
+        let last = self.last.replace((scan.submap, place_m));
+        self.path_m += last
+            .filter(|(submap, _)| *submap == scan.submap)
+            .map_or(0.0, |(_, last_m)| (place_m - last_m).norm());
+        if let Some(growing) = self.growing.as_mut().filter(|one| !one.is_ended_by(scan)) {
+            growing.add(scan, centroids_m);
+            return Ok(None);
+        }
+        let ended = self.finish();
+        self.growing = Some(GrowingSegment::new(scan, centroids_m, side_m, self.path_m)?);
+        Ok(ended)
+    }
+
+    /// The last segment, as it is.
+    pub fn finish(&mut self) -> Option<Segment> {
+        self.growing.take().map(GrowingSegment::finish)
+    }
+}
+
 /// A segment that still grows.
-pub(super) struct GrowingSegment {
+struct GrowingSegment {
     segment: Segment,
     cells: MomentMap,
 }
@@ -52,7 +98,7 @@ impl GrowingSegment {
     /// A segment that a scan begins. `centroids_m`: in the frame of the base at the pose of the scan.
     ///
     /// Fails if `side_m` gives no lattice.
-    pub fn new(
+    fn new(
         scan: &ScanResult,
         centroids_m: &[Vector3<f64>],
         side_m: f64,
@@ -61,7 +107,9 @@ impl GrowingSegment {
         let squares: f64 = centroids_m.iter().map(Vector3::norm_squared).sum();
         let segment = Segment {
             submap: scan.submap,
+            begin_ns: scan.first_ns,
             first_ns: scan.end_ns,
+            end_ns: scan.end_ns,
             path_m,
             odom_from_anchor: scan.odom_from_base,
             drift: about_origin(&scan.drift, &scan.odom_from_base.translation.vector),
@@ -79,7 +127,7 @@ impl GrowingSegment {
     }
 
     /// True if a scan is of another submap or beyond the end of the segment.
-    pub fn is_ended_by(&self, scan: &ScanResult) -> bool {
+    fn is_ended_by(&self, scan: &ScanResult) -> bool {
         let Segment {
             submap,
             odom_from_anchor,
@@ -93,7 +141,8 @@ impl GrowingSegment {
     }
 
     /// Adds the centroids of a scan, in the frame of the base at its pose.
-    pub fn add(&mut self, scan: &ScanResult, centroids_m: &[Vector3<f64>]) {
+    fn add(&mut self, scan: &ScanResult, centroids_m: &[Vector3<f64>]) {
+        self.segment.end_ns = scan.end_ns;
         let anchor_from_base = self.segment.odom_from_anchor.inverse() * scan.odom_from_base;
         let place = |point: &Vector3<f64>| (anchor_from_base * Point3::from(*point)).coords;
         let placed: Vec<_> = centroids_m.iter().map(place).collect();
@@ -101,7 +150,7 @@ impl GrowingSegment {
     }
 
     /// The segment as it is.
-    pub fn finish(self) -> Segment {
+    fn finish(self) -> Segment {
         let point = |point: &Vector3<f64>| [point.x as f32, point.y as f32, point.z as f32];
         Segment {
             points_m: self.cells.centroids_m().iter().map(point).collect(),

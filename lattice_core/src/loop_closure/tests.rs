@@ -2,6 +2,7 @@ use nalgebra::{DMatrix, Isometry3, Matrix6, Vector3, Vector6};
 use proptest::prelude::*;
 
 use super::*;
+use crate::odometry::{ScanResult, Verdict};
 use crate::pose::se3;
 
 /// Numbers from -1 to 1 that follow from a seed.
@@ -302,7 +303,7 @@ fn result_at(
 /// Drives twice around the hall with a drift in heading; gives the closer and the error between the
 /// ends of the last loop by odometry and corrected, m.
 fn drive(submap_of: impl Fn(u32) -> u32) -> (LoopCloser, f64, f64) {
-    let mut closer = LoopCloser::new();
+    let (mut cutter, mut closer) = (SegmentCutter::default(), LoopCloser::default());
     let noise = &mut noise(8);
     let mut odom = Isometry3::identity();
     let mut last = None;
@@ -320,10 +321,12 @@ fn drive(submap_of: impl Fn(u32) -> u32) -> (LoopCloser, f64, f64) {
         spread += segment::about_origin(&covariance(0.01, 0.003), &place_m);
         let drift = segment::about_origin(&spread, &-place_m);
         let result = result_at(odom, number, submap_of(number), drift);
-        closer.add(&result, &scan_of_hall(&truth), 0.3).unwrap();
+        let ended = cutter.add(&result, &scan_of_hall(&truth), 0.3).unwrap();
+        ended.map(|segment| closer.add(segment).unwrap().cloned());
         all.push((result, truth));
     }
-    closer.finish().unwrap();
+    let last = cutter.finish();
+    last.map(|segment| closer.add(segment).unwrap().cloned());
     // Between both ends of the last loop.
     let mut closed = closer.attempts().iter().filter(|attempt| attempt.is_closed);
     let Some(ends_ns) = closed.next_back().map(|attempt| attempt.stamps_ns) else {
@@ -340,7 +343,8 @@ fn drive(submap_of: impl Fn(u32) -> u32) -> (LoopCloser, f64, f64) {
         (found.translation.vector - truth.translation.vector).norm()
     };
     let before_m = error(&|result| result.odom_from_base);
-    let after_m = error(&|result| closer.map_from_base(result));
+    let corrections = closer.corrections();
+    let after_m = error(&|result| corrections.map_from_base(result));
     (closer, before_m, after_m)
 }
 
@@ -364,7 +368,32 @@ fn submaps_are_joined_by_a_loop() {
         "{:?}",
         closer.attempts()
     );
-    let none = LoopCloser::new();
+    let none = LoopCloser::default();
     assert_eq!(none.joined_with(3), BTreeSet::from([3]));
-    assert_eq!(none.map_from_odom(0, 5), Isometry3::identity());
+    assert_eq!(none.corrections().at(5), None);
+}
+
+#[test]
+fn corrections_end_with_their_submap() {
+    let (closer, _, _) = drive(|number| u32::from(number > 200));
+    let corrections = closer.corrections();
+    let of = |number: i64| corrections.at(number * 100_000_000).unwrap().submap;
+    let submaps: Vec<u32> = (0..400).map(of).collect();
+    assert_eq!(submaps.iter().filter(|submap| **submap == 0).count(), 201);
+    assert!(submaps.is_sorted());
+    // The last scan of a submap has its last correction, not a part of the next one's.
+    let anchors = corrections.anchors();
+    let end = anchors.iter().rfind(|anchor| anchor.submap == 0).unwrap();
+    let (last, at_end) = (end.map_from_odom, corrections.at(end.stamp_ns).unwrap());
+    assert_eq!((end.stamp_ns, at_end.map_from_odom), (20_000_000_000, last));
+    // Between two anchors lies a part of both, before and behind all of them the nearest.
+    let (first, second) = (&anchors[0], &anchors[1]);
+    let middle = corrections.at((first.stamp_ns + second.stamp_ns) / 2);
+    let halves = [first, second].map(|anchor| anchor.map_from_odom.translation.vector);
+    let apart = middle.unwrap().map_from_odom.translation.vector - (halves[0] + halves[1]) * 0.5;
+    assert!(apart.norm() < 0.05 * (halves[1] - halves[0]).norm() + 1e-9);
+    for (stamp_ns, nearest) in [(i64::MIN, first), (i64::MAX, &anchors[anchors.len() - 1])] {
+        let found = corrections.at(stamp_ns).unwrap();
+        assert_eq!(found.map_from_odom, nearest.map_from_odom);
+    }
 }

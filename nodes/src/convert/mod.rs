@@ -2,6 +2,7 @@
 
 pub mod calibration;
 pub mod cloud;
+pub mod corrections;
 pub mod geometry;
 pub mod headset_mesh;
 pub mod map;

@@ -3,6 +3,7 @@
 //! [`LatticeMapper`] is a state machine without I/O; [`node`] connects it to DDS.
 
 mod autosave;
+mod corrected;
 mod counts;
 mod datum;
 mod free_options;
@@ -21,6 +22,7 @@ mod report;
 mod services;
 mod unmapped;
 
+pub use corrected::{CorrectedDrive, CorrectionCounts};
 pub use counts::MapperCounts;
 pub use free_options::{FreeSpaceMethod, MappedFreeSpace};
 pub use operations::LoadRefusal;

@@ -1,12 +1,16 @@
 //! ROS node around [`LatticeMapper`].
 
+mod status;
+
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, Once};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use lattice_core::raycast::FreeSpaceError;
 use lattice_msgs::geographic_msgs::GeoPointStamped;
 use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::LabelInfo;
 
 use super::autosave::Autosave;
@@ -16,7 +20,7 @@ use super::outputs::Outputs;
 use super::parameters::Settings;
 use super::services::{self, Call};
 use super::unmapped::Unmapped;
-use super::{LatticeMapper, MapperOptions, MapperReport};
+use super::{CorrectedDrive, LatticeMapper, MapperOptions};
 use crate::compute::{Compute, Inbox};
 use crate::convert::cloud;
 use crate::map_output::{MapOutput, epoch};
@@ -24,7 +28,7 @@ use crate::report;
 use crate::start::{Finish, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Losses, Runtime, SubscriptionExecutor, WORKING, lock};
+use lattice_runtime::{Diagnostics, Losses, Runtime, SubscriptionExecutor, lock};
 
 /// Warning for clouds without viewpoints while free space is on.
 const NO_VIEWPOINTS: &str = "no sensor positions (vp_x, vp_y, vp_z), so no free space: set `viewpoints: true` of enu_transformer";
@@ -32,6 +36,7 @@ const NO_VIEWPOINTS: &str = "no sensor positions (vp_x, vp_y, vp_z), so no free 
 /// Event for the compute thread.
 enum Event {
     Cloud(Arc<PointCloud2>),
+    Corrections(Arc<TFMessage>),
     Update,
     Centers,
     Free,
@@ -62,7 +67,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         runtime.shutdown_handle(),
     )?;
     let autosave_period = autosave.period;
+    let max_kept_bytes = settings.max_kept_bytes;
+    let drive = max_kept_bytes.map(|max_bytes| CorrectedDrive::new(&machine, max_bytes));
     let mut compute_state = ComputeState {
+        drive,
         machine,
         autosave,
         output,
@@ -103,6 +111,23 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         SubscriptionExecutor::Shared,
         take,
     )?;
+    let corrections = match max_kept_bytes {
+        Some(_) => {
+            let inbox = inbox.clone();
+            let hand_over = move |message: Arc<TFMessage>| {
+                if !inbox.send(Event::Corrections(message), 0) {
+                    log::warn!("the inbox is full: corrections are lost until the next ones");
+                }
+            };
+            Some(node.subscribe(
+                "corrections",
+                Qos::LATCHED,
+                SubscriptionExecutor::Shared,
+                hand_over,
+            )?)
+        }
+        None => None,
+    };
     let names = match old.payload().labels {
         true => {
             let maps = maps.clone();
@@ -137,6 +162,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let is_enu = |topic: &str| topic.ends_with("/points_enu");
     node.expect_publishers([&points], "enu_transformer", None, is_enu);
     inputs.watch([&points, &origins, &requests.topic]);
+    inputs.watch(&corrections);
     let calls = services::serve(&node, &inbox, Event::Call, maps, Arc::clone(&max_voxels))?;
     let timer = |period, event: fn() -> Event| {
         let inbox = inbox.clone();
@@ -158,7 +184,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         Ok(())
     });
     Ok(Box::new(move || {
-        drop((points, origins, names));
+        drop((points, origins, names, corrections));
         compute.finish_with(Event::Finish);
         Box::new((requests, more, calls))
     }))
@@ -181,6 +207,8 @@ fn notify(inbox: &Inbox<Event>, event: Event) {
 /// State of the compute thread.
 struct ComputeState {
     machine: LatticeMapper,
+    /// Present if corrections are followed.
+    drive: Option<CorrectedDrive>,
     autosave: Autosave,
     output: MapOutput,
     outputs: Outputs,
@@ -208,7 +236,11 @@ impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Cloud(cloud) => {
-                if let Err(refusal) = self.machine.on_cloud(&cloud) {
+                let mapped = match &mut self.drive {
+                    Some(drive) => drive.on_cloud(&mut self.machine, &cloud),
+                    None => self.machine.on_cloud(&cloud),
+                };
+                if let Err(refusal) = mapped {
                     if let Some(more) = self.refusals.check() {
                         log::warn!("{refusal} ({more} more like it)");
                     }
@@ -221,6 +253,17 @@ impl ComputeState {
                         .call_once(|| log::warn!("{NO_VIEWPOINTS}"));
                 }
             }
+            Event::Corrections(message) => {
+                let taken = self
+                    .drive
+                    .as_mut()
+                    .map(|drive| drive.on_corrections(&message));
+                if let Some(Err(error)) = taken
+                    && let Some(more) = self.refusals.check()
+                {
+                    log::warn!("corrections rejected: {error} ({more} more like it)");
+                }
+            }
             Event::Update => self.update(),
             Event::Centers => self.centers(),
             Event::Free => self.free(),
@@ -231,16 +274,47 @@ impl ComputeState {
             }
             Event::Reset => {
                 self.machine.reset(epoch());
-                self.output.replaced();
+                self.replaced();
             }
             Event::Call(call) => {
                 let done = services::answer(&mut self.machine, call, epoch(), &self.maps);
                 if done.replaced {
-                    self.output.replaced();
+                    self.replaced();
+                }
+                if let (Some(drive), Some(region)) = (&mut self.drive, &done.cleared) {
+                    drive.remove(&self.machine, region);
                 }
                 self.writing = done.writing.or(self.writing.take());
             }
-            Event::Finish => self.finish(),
+            Event::Finish => return self.finish(),
+        }
+        self.correct(CorrectedDrive::step);
+    }
+
+    /// The map is another one, from a file or empty.
+    fn replaced(&mut self) {
+        self.output.replaced();
+        if let Some(drive) = &mut self.drive {
+            drive.restart(&self.machine);
+        }
+    }
+
+    /// Makes the map anew where corrections move it.
+    fn correct(
+        &mut self,
+        work: fn(
+            &mut CorrectedDrive,
+            &mut LatticeMapper,
+            fn() -> u64,
+        ) -> Result<bool, FreeSpaceError>,
+    ) {
+        let Some(drive) = &mut self.drive else {
+            return;
+        };
+        match work(drive, &mut self.machine, epoch) {
+            Ok(true) => self.output.replaced(),
+            Ok(false) => {}
+            Err(error) => log::error!("the map is not corrected: {error}"),
         }
     }
 
@@ -283,83 +357,13 @@ impl ComputeState {
         }
     }
 
-    fn report(&mut self) -> MapperReport {
-        MapperReport {
-            clouds_inbox_full: self.clouds_inbox_full(),
-            clouds_lost_on_network: self.clouds.on_network(),
-            undecodable: self.inputs.undecodable(),
-            updates_not_published: self.output.updates_lost(),
-            chunks_not_published: self.output.chunks_lost(),
-            ..MapperReport::of(&mut self.machine)
-        }
-    }
-
-    /// Clouds rejected by a full inbox or overrun before it.
-    fn clouds_inbox_full(&self) -> u64 {
-        self.lost.load(Ordering::Relaxed) + self.clouds.overrun()
-    }
-
-    fn diagnose(&mut self) {
-        let voxels = self.machine.cells().len();
-        let counts = self.machine.counts();
-        if counts.points_mapped > 0 || voxels > 0 {
-            self.unmapped = None;
-        }
-        let (inbox_full, on_network) = (self.clouds_inbox_full(), self.clouds.on_network());
-        let lost = inbox_full + on_network;
-        let updates = self.output.updates_lost();
-        let not_published = updates + self.output.chunks_lost();
-        let refused =
-            counts.clouds_malformed + counts.clouds_wrong_frame + counts.clouds_stamp_jump;
-        let (level, message) = if let Some(problem) = self.autosave.problem() {
-            (Level::Error, problem)
-        } else if let Some(unmapped) = &self.unmapped {
-            (Level::Warn, unmapped.message(counts))
-        } else if counts.clouds_in == 0 {
-            (Level::Warn, "no cloud yet".to_owned())
-        } else if counts.points_list_full > 0 {
-            let limits = "`max_voxels` or `max_map_bytes`";
-            (Level::Warn, format!("the list is full ({limits})"))
-        } else if counts.clouds_no_viewpoint > 0 {
-            let clouds = counts.clouds_no_viewpoint;
-            (Level::Warn, format!("{clouds} clouds: {NO_VIEWPOINTS}"))
-        } else if counts.ray_blocks_refused > 0 {
-            let problem =
-                "the memory for rays is full (`rays.max_bytes`): not all voxels are cleared";
-            (Level::Warn, problem.to_owned())
-        } else if refused + lost > 0 {
-            let message = format!("{refused} clouds rejected, {lost} lost");
-            (Level::Warn, message)
-        } else if not_published > 0 {
-            let message = format!("{not_published} parts of the map not published");
-            (Level::Warn, message)
-        } else {
-            (Level::Ok, "mapping".to_owned())
-        };
-        let mut values = report::key_values(counts);
-        let distortion = self.machine.distortion();
-        values.extend([
-            ("clouds_inbox_full".into(), inbox_full.to_string()),
-            ("clouds_lost_on_network".into(), on_network.to_string()),
-            ("undecodable".into(), self.inputs.undecodable().to_string()),
-            ("updates_not_published".into(), updates.to_string()),
-            (
-                "chunks_not_published".into(),
-                self.output.chunks_lost().to_string(),
-            ),
-            ("voxels".into(), voxels.to_string()),
-            (WORKING.into(), self.unmapped.is_none().to_string()),
-            ("rms_m".into(), format!("{:.5}", distortion.rms_m)),
-        ]);
-        self.diagnostics.set("map", level, message, values);
-    }
-
     fn finish(&mut self) {
         if let Some(writing) = self.writing.take()
             && writing.join().is_err()
         {
             log::error!("a map file was not completed");
         }
+        self.correct(CorrectedDrive::finish);
         self.autosave.finish(&self.machine);
         self.update();
         let mut left = usize::MAX;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lattice_core::query::{Query, QueryError, Segment, Shells};
 use lattice_core::voxels::file::{MapContents, OperationError};
-use lattice_core::voxels::{Region, VoxelStore};
+use lattice_core::voxels::{Region, RegionError, VoxelStore};
 use lattice_msgs::geometry_msgs::Point;
 use lattice_msgs::lattice::{ClearBoxRequest, ClearBoxResponse, QueryMapRequest, QueryMapResponse};
 use nalgebra::Vector3;
@@ -84,10 +84,19 @@ impl LatticeMapper {
         Ok(voxels)
     }
 
+    /// Takes the map of another mapper of the same lattice and begins a new epoch, as [`LatticeMapper::reset`] does.
+    pub(super) fn take_map(&mut self, other: LatticeMapper, epoch: u64) {
+        (self.list, self.occupancy) = (other.list, other.occupancy);
+        self.begin(epoch);
+        (self.stamps, self.last_stamp_ns) = (other.stamps, other.last_stamp_ns);
+        self.forgot_at_ns = other.forgot_at_ns;
+        // Limits may have changed since.
+        self.set_options(self.options.clone());
+    }
+
     /// Removes the voxels in a box.
     pub fn clear_box(&mut self, request: &ClearBoxRequest) -> ClearBoxResponse {
-        let region = Region::cuboid(vector(&request.min), vector(&request.max));
-        let removed = region.map(|region| match &mut self.occupancy {
+        let removed = region_of(request).map(|region| match &mut self.occupancy {
             Some(occupancy) => occupancy.remove_region(&region),
             None => self.list.remove_region(&region),
         });
@@ -151,6 +160,11 @@ impl LatticeMapper {
         }
         Ok(answer)
     }
+}
+
+/// The box of a request.
+pub(super) fn region_of(request: &ClearBoxRequest) -> Result<Region, RegionError> {
+    Region::cuboid(vector(&request.min), vector(&request.max))
 }
 
 pub(super) fn vector(point: &Point) -> Vector3<f64> {

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use super::MapperOptions;
 use super::autosave::AutosaveOptions;
 use super::map_folder::MapFolder;
+use super::{FreeSpaceMethod, MapperOptions};
 use crate::compute::ComputeLimits;
 use crate::{options, report};
 use lattice_runtime::about;
@@ -16,6 +16,8 @@ const ABOUT: &[About] = about! {
     "cell_volume_m3" fixed(MAP): "Volume of one cell: 0.125 is that of a cube of 0.5 m.";
     "cell_size_m" fixed(MAP): "Edge of the cube with the volume of one cell, in place of cell_volume_m3; 0.0: use cell_volume_m3.";
     "map_frame" fixed(options::FRAME): "Required frame of clouds.";
+    "follow_corrections" fixed(MAP): "Whether clouds are in the frame of an odometry, which the topic corrections of lidar_odometry places in map_frame: clouds are kept, one point in each quarter of a cell's edge and segment of the drive, and mapped anew where loops move them. Not with free_space.";
+    "max_kept_bytes" fixed(MAP): "Memory limit for the clouds that are kept; beyond it the map grows without being corrected.";
     "datum_m" fixed(MAP): "Origin of the voxel keys: the lattice point nearest to this position in the map frame. Keys reach a million cells in every direction. If not set, the origin, or near the first point if that is out of range, as in UTM.";
     "payload" fixed(MAP): "centroid: count and mean of the points of each voxel; occupancy: 2 to 3 bytes a voxel, without count, mean, labels and stamps.";
     "free_space" fixed(MAP): "Use of rays from the sensor: off (voxels stay), clear (rays clear voxels), or evidence (voxels that are probably free by the hits and misses of all scans are removed). Needs viewpoints of enu_transformer. In quotes: YAML parses a bare off as false.";
@@ -62,6 +64,8 @@ pub(super) struct Settings {
     /// Zero without free space to publish.
     pub free_period: Duration,
     pub octomap_services: bool,
+    /// Memory limit for kept clouds, if corrections are followed.
+    pub max_kept_bytes: Option<usize>,
     pub report_file: String,
 }
 
@@ -72,6 +76,12 @@ impl Settings {
         params.describe(options::COMMON);
         let mapper = MapperOptions::from_params(params)?;
         let free_period = options::period(params, "free_period_s", 1.0)?;
+        let max_kept_bytes = params.positive("max_kept_bytes", 2 << 30)?;
+        let follows = params.bool("follow_corrections", false)?;
+        if follows && mapper.free_space.method != FreeSpaceMethod::Off {
+            let problem = "kept clouds have no rays: needs `free_space: \"off\"`";
+            return Err(params.invalid("follow_corrections", problem));
+        }
         let has_free = mapper.free_space.free_level > 0;
         Ok(Self {
             limits: ComputeLimits {
@@ -89,6 +99,7 @@ impl Settings {
                 Duration::ZERO
             },
             octomap_services: params.bool("octomap_services", false)?,
+            max_kept_bytes: follows.then_some(max_kept_bytes),
             report_file: report::file(params)?,
             mapper,
         })

@@ -18,6 +18,16 @@ pub enum CloudRefusal {
     /// The data do not match the header.
     #[error("malformed cloud: {0}")]
     Malformed(#[from] lattice_core::cloud::CloudError),
+    /// Corrections are followed, and none has come.
+    #[error(
+        "no corrections of the cloud's frame yet: set `map_frame` of lidar_odometry, or `follow_corrections: false`"
+    )]
+    NoCorrections,
+    /// Cloud of another drive than the map.
+    #[error(
+        "the odometry has begun another drive, whose place in the map is unknown: save the map, then call ~/reset"
+    )]
+    OtherDrive,
     /// Stamp of another time, which would make voxels expire.
     #[error(
         "cloud stamp {stamp_ns} ns is {:.1} s from the previous one: check the clocks",

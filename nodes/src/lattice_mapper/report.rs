@@ -4,7 +4,7 @@ use lattice_core::voxels::Distortion;
 use lattice_msgs::cdr;
 use serde::{Deserialize, Serialize};
 
-use super::{LatticeMapper, MapperCounts};
+use super::{CorrectionCounts, LatticeMapper, MapperCounts};
 
 /// Report of a `lattice_mapper`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,6 +27,9 @@ pub struct MapperReport {
     /// Keyframe chunks dropped by the publisher.
     #[serde(default)]
     pub chunks_not_published: u64,
+    /// Counters of corrections, where they are followed.
+    #[serde(default)]
+    pub corrections: Option<CorrectionCounts>,
     /// Voxels in the map.
     pub voxels: usize,
     /// Points in the distortion statistics.
@@ -79,6 +82,7 @@ impl MapperReport {
             undecodable: 0,
             updates_not_published: 0,
             chunks_not_published: 0,
+            corrections: None,
             voxels: cells.len(),
             points,
             mse_per_dimension_m2,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle};
 
+use lattice_core::voxels::Region;
 use lattice_core::voxels::file::MapContents;
 use lattice_msgs::RosService;
 use lattice_msgs::lattice::{
@@ -16,6 +17,7 @@ use lattice_msgs::octomap_msgs::BoundingBoxQueryResponse;
 
 use super::LatticeMapper;
 use super::map_folder::MapFolder;
+use super::operations::region_of;
 use super::plan::{self, Planner};
 use crate::compute::Inbox;
 use crate::start::NodeError;
@@ -111,6 +113,8 @@ pub(super) struct Done {
     pub(super) writing: Option<JoinHandle<()>>,
     /// True if the map was replaced.
     pub(super) replaced: bool,
+    /// The region that was cleared.
+    pub(super) cleared: Option<Region>,
 }
 
 /// Executes a call on the compute thread.
@@ -142,12 +146,16 @@ pub(super) fn answer(
             }
             Err(refusal) => reply.send(load_failed(refusal)),
         },
-        Call::ClearBox(request, reply) => reply.send(machine.clear_box(&request)),
+        Call::ClearBox(request, reply) => {
+            reply.send(machine.clear_box(&request));
+            done.cleared = region_of(&request).ok();
+        }
         Call::ClearBoundingBox(request, reply) => {
-            let done = machine.clear_box(&request);
-            if !done.success {
-                log::warn!("box not cleared: {}", done.message);
+            let cleared = machine.clear_box(&request);
+            if !cleared.success {
+                log::warn!("box not cleared: {}", cleared.message);
             }
+            done.cleared = region_of(&request).ok();
             reply.send(BoundingBoxQueryResponse::default());
         }
         Call::Query(request, reply) => reply.send(machine.query(&request)),

@@ -58,6 +58,15 @@ impl OdometryCounts {
 pub struct OdometryReport {
     /// Everything counted by the state machine.
     pub counts: OdometryCounts,
+    /// Loops that closed.
+    #[serde(default)]
+    pub loops_closed: u64,
+    /// Loops whose registration was not certain, or that the others contradict.
+    #[serde(default)]
+    pub loops_refused: u64,
+    /// Segments that found the queue of the thread of loops full: no loop is sought for them.
+    #[serde(default)]
+    pub segments_queue_full: u64,
     /// Clouds that found the inbox, or the queue before it, full.
     pub clouds_inbox_full: u64,
     /// Samples of imu and wheels that found the inbox full.

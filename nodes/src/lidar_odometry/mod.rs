@@ -3,6 +3,8 @@
 //! [`LidarOdometry`] is a state machine without I/O around [`lattice_core::odometry`].
 
 mod counts;
+mod live_loops;
+mod loops;
 mod motions;
 pub mod node;
 mod options;
@@ -10,11 +12,12 @@ mod parameters;
 mod path;
 
 pub use counts::{OdometryCounts, OdometryReport};
+pub use loops::DriveLoops;
 pub use options::LidarOdometryOptions;
 pub use parameters::declare;
 
 use lattice_core::cloud::CloudLimits;
-use lattice_core::loop_closure::LoopCloser;
+use lattice_core::loop_closure::{Segment, SegmentCutter};
 use lattice_core::odometry::{
     LostCause, Odometry as Core, OdometryOptions, Prior, Scan, ScanResult, Verdict,
 };
@@ -42,6 +45,10 @@ pub struct Registered {
     pub tag: i64,
     /// Pose and verdict.
     pub result: ScanResult,
+    /// Number of the drive, from 0: another one begins where a log begins again.
+    pub drive: u32,
+    /// Segment of the drive that ends before the scan, if loops are sought.
+    pub segment: Option<Segment>,
 }
 
 /// A scan in the frame of the machine.
@@ -75,9 +82,11 @@ pub struct LidarOdometry {
     /// Scan that waits for the motion up to its end.
     waiting: Option<ReadScan>,
     last: Option<ScanResult>,
-    /// End of the last scan with a certain pose.
-    certain_ns: Option<i64>,
-    loops: Option<LoopCloser>,
+    /// End of the last scan with a certain pose, and its submap.
+    certain: Option<(i64, u32)>,
+    /// Present if loops are sought.
+    cutter: Option<SegmentCutter>,
+    drive: u32,
 }
 
 impl LidarOdometry {
@@ -97,8 +106,9 @@ impl LidarOdometry {
             motions: Motions::new(),
             waiting: None,
             last: None,
-            certain_ns: None,
-            loops: options.loops.then(LoopCloser::new),
+            certain: None,
+            cutter: options.loops.then(SegmentCutter::default),
+            drive: 0,
             options,
         }
     }
@@ -177,31 +187,29 @@ impl LidarOdometry {
         let result = self.register(&scan)?;
         self.count(&result);
         self.last = Some(result.clone());
-        self.close_loop(&result);
+        let segment = self.cut(&result);
         Some(Registered {
             tag: scan.tag,
             result,
+            drive: self.drive,
+            segment,
         })
     }
 
-    /// Looks for a loop that the newest scan completes.
-    fn close_loop(&mut self, result: &ScanResult) {
-        let (Some(loops), Some(sizes)) = (&mut self.loops, self.core.sizes()) else {
-            return;
-        };
+    /// Adds the newest scan to its segment, and gives the one that ends before it.
+    fn cut(&mut self, result: &ScanResult) -> Option<Segment> {
+        let (cutter, sizes) = (self.cutter.as_mut()?, self.core.sizes()?);
+        let cut = cutter.add(result, self.core.centroids_m(), sizes.centroids_m);
         // Sizes that gave the scan a lattice give one here.
-        if let Err(error) = loops.add(result, self.core.centroids_m(), sizes.centroids_m) {
+        cut.unwrap_or_else(|error| {
             log::debug!("no loop is sought: {error}");
-        }
+            None
+        })
     }
 
-    /// Ends the drive and gives its loops; none if they are not sought, or if the log began again.
-    pub fn finish_loops(&mut self) -> Option<LoopCloser> {
-        let mut loops = self.loops.take()?;
-        if let Err(error) = loops.finish() {
-            log::debug!("no loop is sought: {error}");
-        }
-        Some(loops)
+    /// The last segment of the drive, if loops are sought.
+    pub fn last_segment(&mut self) -> Option<Segment> {
+        self.cutter.as_mut()?.finish()
     }
 
     fn register_if_complete(&mut self) -> Option<Registered> {
@@ -251,7 +259,9 @@ impl LidarOdometry {
         {
             if last_ns.saturating_sub(times.last_ns) > CLOCK_JUMP_NS {
                 // A log that loops: another drive.
-                (self.last, self.certain_ns, self.loops) = (None, None, None);
+                (self.last, self.certain) = (None, None);
+                self.cutter = self.cutter.take().map(|_| SegmentCutter::default());
+                self.drive += 1;
                 self.core = Core::new(OdometryOptions {
                     lattice: options.lattice,
                 });
@@ -343,15 +353,18 @@ impl LidarOdometry {
         odometry_message(odom, base, result)
     }
 
-    /// Poses that cover a scan, if its place in the first submap is certain; else none. Clouds between them can be mapped.
+    /// Poses that cover a scan, if its place in its submap is certain; else none. Clouds between them can be mapped. Where no
+    /// loops are sought, only the first submap has poses.
     pub fn certain(&mut self, result: &ScanResult) -> Vec<Odometry> {
-        if result.verdict != Verdict::Ok || result.submap > 0 {
+        if result.verdict != Verdict::Ok || result.submap > 0 && !self.options.loops {
             return Vec::new();
         }
-        let before_ns = self.certain_ns.replace(result.end_ns);
-        let follows = |before_ns: i64| result.first_ns.saturating_sub(before_ns) <= PAUSE_NS;
+        let before = self.certain.replace((result.end_ns, result.submap));
+        let follows = |(before_ns, submap): (i64, u32)| {
+            submap == result.submap && result.first_ns.saturating_sub(before_ns) <= PAUSE_NS
+        };
         let mut poses = Vec::new();
-        if !before_ns.is_some_and(follows) && result.first_ns < result.end_ns {
+        if !before.is_some_and(follows) && result.first_ns < result.end_ns {
             poses.push(self.message(&result.at_first()));
         }
         poses.push(self.message(result));

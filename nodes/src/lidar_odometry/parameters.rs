@@ -9,6 +9,7 @@ use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
     "odom_frame" fixed(FRAME): "Frame of the poses; its origin is the machine at the end of the first scan.";
+    "map_frame" fixed(FRAME): "Frame of poses corrected by loops: map_frame -> odom_frame and corrections are published, and odometry_ok has all submaps; lattice_mapper then needs follow_corrections. Empty: no loops are sought.";
     "base_frame" fixed(FRAME): "Frame of the machine; the frame of the clouds needs a transform to it.";
     "publish_tf" fixed(TOPIC): "Whether odom_frame -> base_frame is published; false where wheel odometry publishes it.";
     "min_range_m" fixed(MAP): "Points nearer to the sensor are rejected.";
@@ -26,6 +27,8 @@ const MAP: &str = "the map of the scans before is made with it";
 /// Settings of the node by its parameters.
 pub(super) struct Settings {
     pub odometry: LidarOdometryOptions,
+    /// Frame of corrected poses, if loops are sought.
+    pub map_frame: Option<String>,
     pub limits: ComputeLimits,
     pub report_file: String,
 }
@@ -35,8 +38,16 @@ impl Settings {
     pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
         params.describe(ABOUT);
         params.describe(options::COMMON);
+        let map_frame = params.string("map_frame", "")?;
+        let map_frame = map_frame.trim_start_matches('/');
+        let mut odometry = LidarOdometryOptions::from_params(params)?;
+        odometry.loops = !map_frame.is_empty();
+        if map_frame == odometry.odom_frame {
+            return Err(params.invalid("map_frame", "expected a frame other than `odom_frame`"));
+        }
         Ok(Self {
-            odometry: LidarOdometryOptions::from_params(params)?,
+            odometry,
+            map_frame: Some(map_frame.to_owned()).filter(|frame| !frame.is_empty()),
             limits: ComputeLimits {
                 events: options::inbox_events(params, 256)?,
                 bytes: options::inbox_bytes(params, 64 << 20)?,

@@ -15,8 +15,8 @@ const FIRST_STEP_M: f64 = 0.25;
 pub(super) struct ThinPath {
     frame: String,
     step_m: f64,
-    poses: Vec<PoseStamped>,
-    last: Option<Isometry3<f64>>,
+    /// Poses by odometry, with their times, ns.
+    poses: Vec<(i64, Isometry3<f64>)>,
 }
 
 impl ThinPath {
@@ -26,35 +26,41 @@ impl ThinPath {
             frame: frame.to_owned(),
             step_m: FIRST_STEP_M,
             poses: Vec::new(),
-            last: None,
         }
     }
 
-    /// The path with a pose, if the pose is far enough from the last one.
-    pub fn add(&mut self, stamp_ns: i64, pose: &Isometry3<f64>) -> Option<Path> {
-        let last = self.last.as_ref();
-        let moved_m = last.map(|last| (pose.translation.vector - last.translation.vector).norm());
+    /// Adds a pose by odometry; true if it is far enough from the last one to be kept.
+    pub fn add(&mut self, stamp_ns: i64, pose: &Isometry3<f64>) -> bool {
+        let last = self.poses.last();
+        let moved_m =
+            last.map(|(_, last)| (pose.translation.vector - last.translation.vector).norm());
         if moved_m.is_some_and(|moved_m| moved_m < self.step_m) {
-            return None;
+            return false;
         }
-        self.last = Some(*pose);
-        let header = geometry::header(&self.frame, stamp_ns);
-        self.poses.push(PoseStamped {
-            header: header.clone(),
-            pose: geometry::pose_from(pose),
-        });
+        self.poses.push((stamp_ns, *pose));
         if self.poses.len() > MAX_POSES {
-            let mut is_kept = false;
+            let newest = self.poses.len() - 1;
+            let mut number = 0;
             self.poses.retain(|_| {
-                is_kept = !is_kept;
-                is_kept
+                number += 1;
+                (number - 1) % 2 == newest % 2
             });
             self.step_m *= 2.0;
         }
-        Some(Path {
-            header,
-            poses: self.poses.clone(),
-        })
+        true
+    }
+
+    /// The path, with poses corrected by `frame_from_odom` at their times.
+    pub fn message(&self, frame_from_odom: impl Fn(i64) -> Isometry3<f64>) -> Path {
+        let pose = |(stamp_ns, pose): &(i64, Isometry3<f64>)| PoseStamped {
+            header: geometry::header(&self.frame, *stamp_ns),
+            pose: geometry::pose_from(&(frame_from_odom(*stamp_ns) * pose)),
+        };
+        let newest_ns = self.poses.last().map_or(0, |(stamp_ns, _)| *stamp_ns);
+        Path {
+            header: geometry::header(&self.frame, newest_ns),
+            poses: self.poses.iter().map(pose).collect(),
+        }
     }
 }
 
@@ -67,17 +73,28 @@ mod tests {
     #[test]
     fn a_long_path_stays_small() {
         let mut path = ThinPath::new("robot1/odom");
-        let mut newest = Path::default();
         for i in 0..4000 {
-            let pose = Isometry3::translation(f64::from(i), 0.0, 0.0);
-            newest = path.add(i64::from(i), &pose).unwrap_or(newest);
+            path.add(
+                i64::from(i),
+                &Isometry3::translation(f64::from(i), 0.0, 0.0),
+            );
         }
+        let newest = path.message(|_| Isometry3::identity());
         assert!((250..=MAX_POSES).contains(&newest.poses.len()));
         assert_eq!(newest.poses[0].pose.position.x, 0.0);
         assert!(cdr::to_vec(&newest).unwrap().len() < 60_000);
-        assert!(
-            path.add(4000, &Isometry3::translation(3999.5, 0.0, 0.0))
-                .is_none()
-        );
+        let last = newest.poses.last().unwrap().pose.position.x;
+        assert!(!path.add(4000, &Isometry3::translation(last + 0.5, 0.0, 0.0)));
+    }
+
+    #[test]
+    fn a_corrected_path_has_the_correction_of_each_time() {
+        let mut path = ThinPath::new("map");
+        for i in 0..10 {
+            assert!(path.add(i, &Isometry3::translation(i as f64, 0.0, 0.0)));
+        }
+        let moved = path.message(|stamp_ns| Isometry3::translation(0.0, stamp_ns as f64, 0.0));
+        assert!((moved.poses.iter()).all(|pose| pose.pose.position.x == pose.pose.position.y));
+        assert_eq!(moved.poses.len(), 10);
     }
 }

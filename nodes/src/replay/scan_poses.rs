@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use lattice_bag::{BagReader, ReadOptions};
-use lattice_core::loop_closure::LoopCloser;
+use lattice_core::loop_closure::Corrections;
 use lattice_core::odometry::{ScanResult, Verdict};
 use lattice_msgs::cdr;
 use lattice_msgs::nav_msgs::Odometry;
@@ -16,7 +16,8 @@ use super::topics::{Role, TopicError};
 use crate::cloud_input::SensorCloud;
 use crate::enu_transformer::Refusal;
 use crate::lidar_odometry::{
-    LidarOdometry, LidarOdometryOptions, OdometryCounts, PAUSE_NS, Registered, odometry_message,
+    DriveLoops, LidarOdometry, LidarOdometryOptions, OdometryCounts, PAUSE_NS, Registered,
+    odometry_message,
 };
 
 /// Odometry of a replay.
@@ -197,7 +198,7 @@ pub(super) struct ScanPoses {
     base_frame: String,
     /// The submaps that loops join, with the most scans that are `OK`.
     mapped: BTreeSet<u32>,
-    loops: LoopCloser,
+    corrections: Corrections,
     /// Time of the newest pose given.
     given_ns: Option<i64>,
     pub topic: usize,
@@ -219,16 +220,19 @@ impl ScanPoses {
         let imu_name = plan.imu.and_then(|topic| bag.topics().get(topic));
         let imu_name = imu_name.map_or("", |topic| &topic.name);
         let mut scans = BTreeMap::new();
+        let mut loops = DriveLoops::default();
         let on_input = &mut |machine: &mut LidarOdometry, input: OdometryInput| {
-            let found = input.give(machine).into_iter();
-            scans.extend(found.map(|found| (found.tag, found.result)));
+            for found in input.give(machine) {
+                loops.add(&found);
+                scans.insert(found.tag, found.result);
+            }
         };
         feed_odometry(bag, plan, topic, &mut machine, on_input, progress)?;
         let mut in_submaps: BTreeMap<u32, u64> = BTreeMap::new();
         for scan in scans.values().filter(|scan| scan.verdict == Verdict::Ok) {
             *in_submaps.entry(scan.submap).or_default() += 1;
         }
-        let loops = machine.finish_loops().unwrap_or_default();
+        let loops = loops.finish(&mut machine);
         let count = |submaps: &BTreeSet<u32>| -> u64 {
             submaps.iter().filter_map(|one| in_submaps.get(one)).sum()
         };
@@ -257,7 +261,7 @@ impl ScanPoses {
             odom_frame,
             base_frame,
             mapped,
-            loops,
+            corrections: loops.corrections(),
             given_ns: None,
             topic,
         })
@@ -289,7 +293,7 @@ impl ScanPoses {
     /// The pose, corrected by the loops.
     fn message(&self, scan: &ScanResult) -> Odometry {
         let mut corrected = scan.clone();
-        corrected.odom_from_base = self.loops.map_from_base(scan);
+        corrected.odom_from_base = self.corrections.map_from_base(scan);
         odometry_message(&self.odom_frame, &self.base_frame, &corrected)
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use lattice_bag::BagReader;
 use lattice_nodes::enu_transformer::TransformerOptions;
-use lattice_nodes::lidar_odometry::{LidarOdometry, LidarOdometryOptions, Registered};
+use lattice_nodes::lidar_odometry::{DriveLoops, LidarOdometry, LidarOdometryOptions};
 use lattice_nodes::replay::{OdometryInput, TopicWishes, feed_odometry, plan};
 
 use super::{LoopTrial, Measurement, OdometryTrial, report_of};
@@ -50,6 +50,7 @@ pub fn measure_log(
     let mut measurement = Measurement::default();
     // Times of the scans, and the number of those with a truth.
     let (mut span_ns, mut known) = (None, 0);
+    let (mut loops, mut loops_s) = (DriveLoops::default(), 0.0);
     let on_input = &mut |machine: &mut LidarOdometry, input: OdometryInput| {
         let refused = machine.counts().clouds_refused();
         let (found, spent) = timed(|| input.give(machine));
@@ -57,7 +58,10 @@ pub fn measure_log(
         for _ in refused..machine.counts().clouds_refused() {
             measurement.add(None);
         }
-        for Registered { result, .. } in found {
+        for found in found {
+            let ((), spent) = timed(|| loops.add(&found));
+            loops_s += spent.cpu_s;
+            let result = found.result;
             let (first_ns, _) = span_ns.unwrap_or((result.end_ns, result.end_ns));
             span_ns = Some((first_ns, result.end_ns));
             let truth = truth.at(result.end_ns).ok();
@@ -86,9 +90,9 @@ pub fn measure_log(
         );
         return Err(at(&of.truth)(why));
     }
-    if let Some(loops) = machine.finish_loops() {
-        measurement.trial.loops = LoopTrial::of(&loops, &measurement.found, None);
-    }
+    let (loops, spent) = timed(|| loops.finish(&mut machine));
+    let loops_s = loops_s + spent.cpu_s;
+    measurement.trial.loops = LoopTrial::of(&loops, &measurement.found, loops_s);
     let log = of.log.file_name().unwrap_or(of.log.as_os_str());
     let trial = OdometryTrial {
         scene: log.to_string_lossy().into_owned(),

@@ -20,17 +20,13 @@ pub struct LoopTrial {
     pub wrong: u64,
     /// Root mean square of the errors of corrected poses, since the first one, m; `None` if no loop closed.
     pub ate_m: Option<f64>,
-    /// Processor time of all loops, s; `None` for logs, where it counts with the scans.
+    /// Processor time of all loops, s.
     pub cpu_s: Option<f64>,
 }
 
 impl LoopTrial {
     /// Measures the loops of a drive by poses that are `OK`, with their truths.
-    pub fn of(
-        loops: &LoopCloser,
-        found: &[(ScanResult, Isometry3<f64>)],
-        cpu_s: Option<f64>,
-    ) -> LoopTrial {
+    pub fn of(loops: &LoopCloser, found: &[(ScanResult, Isometry3<f64>)], cpu_s: f64) -> LoopTrial {
         let closed = loops.attempts().iter().filter(|attempt| attempt.is_closed);
         let truth_at = |stamp_ns: i64| {
             let found = found.iter().find(|(scan, _)| scan.end_ns == stamp_ns);
@@ -52,7 +48,7 @@ impl LoopTrial {
             closed: count as u64,
             wrong: wrong.count() as u64,
             ate_m: (count > 0).then(|| ate_m(loops, found)).flatten(),
-            cpu_s,
+            cpu_s: Some(cpu_s),
         }
     }
 }
@@ -61,10 +57,12 @@ impl LoopTrial {
 fn ate_m(loops: &LoopCloser, found: &[(ScanResult, Isometry3<f64>)]) -> Option<f64> {
     let submaps: BTreeSet<u32> = found.iter().map(|(scan, _)| scan.submap).collect();
     let parts = submaps.iter().map(|submap| loops.joined_with(*submap));
+    let corrections = loops.corrections();
     let of = |part: &BTreeSet<u32>| -> Vec<(Isometry3<f64>, Isometry3<f64>)> {
         let mapped = found.iter().filter(|(scan, _)| part.contains(&scan.submap));
-        let pose =
-            |(scan, truth): &(ScanResult, Isometry3<f64>)| (loops.map_from_base(scan), *truth);
+        let pose = |(scan, truth): &(ScanResult, Isometry3<f64>)| {
+            (corrections.map_from_base(scan), *truth)
+        };
         mapped.map(pose).collect()
     };
     let poses = parts.map(|part| of(&part)).max_by_key(Vec::len)?;

@@ -6,7 +6,7 @@ mod loops;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use lattice_core::loop_closure::LoopCloser;
+use lattice_core::loop_closure::{LoopCloser, SegmentCutter};
 use lattice_core::odometry::{Odometry, OdometryOptions, Prior, Scan, ScanResult, Verdict};
 use lattice_nodes::files::atomic_write::write_text;
 use nalgebra::{Isometry3, Vector6};
@@ -136,7 +136,7 @@ impl Measurement {
     /// Registers so many scans of a drive.
     fn drive(&mut self, drive: &Drive, scans: usize) -> Result<(), AnyError> {
         let mut odometry = Odometry::new(OdometryOptions::default());
-        let mut loops = LoopCloser::new();
+        let (mut cutter, mut loops) = (SegmentCutter::default(), LoopCloser::default());
         for number in drive.scans().take(scans) {
             let scan = drive.scan(number);
             let input = Scan {
@@ -148,17 +148,21 @@ impl Measurement {
             self.spend(spent);
             let result = result?;
             let side_m = odometry.sizes().map_or(f64::NAN, |sizes| sizes.centroids_m);
-            let (closed, spent) = timed(|| {
-                loops
-                    .add(&result, odometry.centroids_m(), side_m)
-                    .map(|_| ())
-            });
+            let (closed, spent) =
+                timed(
+                    || match cutter.add(&result, odometry.centroids_m(), side_m)? {
+                        Some(segment) => loops.add(segment).map(|_| ()),
+                        None => Ok(()),
+                    },
+                );
             closed?;
             self.loops_s += spent.cpu_s;
             self.add(Some((result, Some(drive.pose(scan.end_ns)))));
         }
-        loops.finish()?;
-        self.trial.loops = LoopTrial::of(&loops, &self.found, Some(self.loops_s));
+        if let Some(last) = cutter.finish() {
+            loops.add(last)?;
+        }
+        self.trial.loops = LoopTrial::of(&loops, &self.found, self.loops_s);
         Ok(())
     }
 

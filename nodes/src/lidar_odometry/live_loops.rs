@@ -1,0 +1,195 @@
+//! Loops of a running odometry, sought on a thread of their own: a registration takes seconds.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex};
+use std::{io, thread};
+
+use crossbeam_channel::{Receiver, Sender, bounded};
+use lattice_core::loop_closure::{LoopCloser, Segment};
+use lattice_core::odometry::Verdict;
+use lattice_runtime::lock;
+use nalgebra::{Isometry3, Vector3};
+
+use super::Registered;
+use crate::convert::corrections::PlacedCorrections;
+
+/// Segments that wait for the thread: at half a range of path each, hundreds of metres.
+const QUEUE: usize = 64;
+
+/// What the thread is given.
+enum Work {
+    NewDrive(u32),
+    Segment(Segment),
+}
+
+/// Loops and corrections of the drive so far.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LoopState {
+    drive: u32,
+    /// Number that grows with each change.
+    pub version: u64,
+    pub corrections: PlacedCorrections,
+    /// Places of both ends of each loop that closed, metres in the map.
+    pub lines_m: Vec<[Vector3<f64>; 2]>,
+    pub closed: u64,
+    pub refused: u64,
+    /// Submaps that have begun: number, end of the last scan before, time of the first point, ns.
+    begun: Vec<(u32, i64, i64)>,
+    /// End of the newest scan with a certain pose, ns.
+    end_ns: i64,
+}
+
+impl LoopState {
+    /// Takes a scan with a certain pose: begins its submap, unless it has begun.
+    fn on_scan(&mut self, submap: u32, begin_ns: i64, end_ns: i64) {
+        let before_ns = std::mem::replace(&mut self.end_ns, end_ns);
+        let anchors = self.corrections.corrections.anchors();
+        if anchors.last().is_some_and(|last| last.submap >= submap) {
+            return;
+        }
+        if anchors.is_empty() {
+            self.corrections.placed.insert(submap);
+        }
+        self.begun.push((submap, before_ns, begin_ns));
+        let corrections = &mut self.corrections.corrections;
+        corrections.begin_submap(submap, before_ns, begin_ns);
+        self.version += 1;
+    }
+}
+
+/// Loops of a running odometry.
+pub(super) struct LiveLoops {
+    state: Arc<Mutex<LoopState>>,
+    work: Sender<Work>,
+    /// Segments without a place in the queue.
+    pub segments_queue_full: u64,
+}
+
+impl LiveLoops {
+    /// Starts the thread; `on_change` is called after each segment. The thread ends with the queue.
+    pub fn start(on_change: impl Fn() + Send + Sync + 'static) -> io::Result<Self> {
+        let (work, queue) = bounded(QUEUE);
+        let state: Arc<Mutex<LoopState>> = Arc::default();
+        // The cores belong to the odometry.
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .thread_name(|_| "loops".to_owned())
+            .build()
+            .map_err(io::Error::other)?;
+        let shared = Arc::clone(&state);
+        let seek = move || pool.install(|| seek(&queue, &shared, &on_change));
+        thread::Builder::new()
+            .name("loops queue".to_owned())
+            .spawn(seek)?;
+        Ok(Self {
+            state,
+            work,
+            segments_queue_full: 0,
+        })
+    }
+
+    /// Takes a scan of the drive.
+    pub fn on_scan(&mut self, found: &Registered) {
+        let drive = found.drive;
+        if lock(&self.state).drive != drive {
+            let mut state = lock(&self.state);
+            *state = LoopState {
+                drive,
+                version: state.version + 1,
+                ..LoopState::default()
+            };
+            drop(state);
+            self.send(Work::NewDrive(drive));
+        }
+        if let Some(segment) = &found.segment {
+            self.send(Work::Segment(segment.clone()));
+        }
+        if found.result.verdict == Verdict::Ok {
+            let result = &found.result;
+            lock(&self.state).on_scan(result.submap, result.first_ns, result.end_ns);
+        }
+    }
+
+    fn send(&mut self, work: Work) {
+        self.segments_queue_full += u64::from(self.work.try_send(work).is_err());
+    }
+
+    /// State of now, if its number is not `version`.
+    pub fn newer_than(&self, version: u64) -> Option<LoopState> {
+        let state = lock(&self.state);
+        (state.version != version).then(|| state.clone())
+    }
+
+    /// Pose of the frame of the odometry in the map: of submaps without a known place that of the submap before.
+    pub fn map_from_odom(&self, stamp_ns: i64) -> Isometry3<f64> {
+        let anchor = lock(&self.state).corrections.corrections.at(stamp_ns);
+        anchor.map_or_else(Isometry3::identity, |anchor| anchor.map_from_odom)
+    }
+
+    /// True if the place of a submap in the map is known.
+    pub fn is_placed(&self, submap: u32) -> bool {
+        lock(&self.state).corrections.placed.contains(&submap)
+    }
+
+    /// Numbers of loops that closed and that were refused.
+    pub fn counts(&self) -> [u64; 2] {
+        let state = lock(&self.state);
+        [state.closed, state.refused]
+    }
+}
+
+/// Seeks loops until the queue ends.
+fn seek(queue: &Receiver<Work>, state: &Mutex<LoopState>, on_change: &dyn Fn()) {
+    let (mut closer, mut drive) = (LoopCloser::default(), 0);
+    for work in queue {
+        match work {
+            Work::NewDrive(number) => (closer, drive) = (LoopCloser::default(), number),
+            Work::Segment(segment) => {
+                if let Err(error) = closer.add(segment) {
+                    log::debug!("no loop is sought: {error}");
+                    continue;
+                }
+                renew(&mut lock(state), &closer, drive);
+                on_change();
+            }
+        }
+    }
+}
+
+/// Brings the state up to the segments of a closer.
+fn renew(state: &mut LoopState, closer: &LoopCloser, drive: u32) {
+    if state.drive != drive {
+        return;
+    }
+    let mut corrections = closer.corrections();
+    let Some((first, last)) = corrections
+        .anchors()
+        .first()
+        .zip(corrections.anchors().last())
+    else {
+        return;
+    };
+    let (first, last) = (first.submap, last.submap);
+    // Submaps that begin after the last segment.
+    for (submap, end_ns, begin_ns) in &state.begun {
+        if *submap > last {
+            corrections.begin_submap(*submap, *end_ns, *begin_ns);
+        }
+    }
+    let placed: BTreeSet<u32> = closer.joined_with(first);
+    let closed = (closer.attempts().iter()).filter(|attempt| attempt.is_closed);
+    let place = |number: usize| {
+        let pose = closer.map_from_anchors().get(number);
+        pose.map_or_else(Vector3::zeros, |pose| pose.translation.vector)
+    };
+    state.lines_m = closed
+        .map(|attempt| [attempt.from, attempt.to].map(place))
+        .collect();
+    state.closed = state.lines_m.len() as u64;
+    state.refused = closer.attempts().len() as u64 - state.closed;
+    state.corrections = PlacedCorrections {
+        corrections,
+        placed,
+    };
+    state.version += 1;
+}
