@@ -11,7 +11,7 @@ use super::discovered_graph::DiscoveredGraph;
 use super::output_types::OutputTypes;
 use super::peers::Peers;
 use super::port::{EndpointId, PortEvent};
-use super::remote::{GraphRole, RemotePublisher};
+use super::remote::{Announced, GraphRole, RemotePublisher};
 use super::sync::lock;
 
 /// Limit of stored events for endpoints that are not registered yet.
@@ -83,7 +83,9 @@ impl Endpoints {
                 node,
             } => {
                 let (role, topic) = (GraphRole::Publisher, &publisher.topic);
-                self.discovered_graph.add(peer, role, topic, node);
+                let announced = Some(Announced::from(&*publisher));
+                self.discovered_graph
+                    .add(peer, (role, topic), announced, node);
                 // Added first, so that an output created meanwhile finds it.
                 self.remotes.add(peer, (*publisher).clone());
                 for line in self.outputs.on_found(&publisher) {
@@ -95,8 +97,12 @@ impl Endpoints {
                 peer,
                 role,
                 name,
+                announced,
                 node,
-            } => return self.discovered_graph.add(peer, role, &name, node),
+            } => {
+                let announced = announced.map(|announced| *announced);
+                return (self.discovered_graph).add(peer, (role, &name), announced, node);
+            }
             PortEvent::Lost { peer: lost } => return self.lost(|peer| *peer == lost),
         };
         let change = Change { peer, incompatible };
