@@ -33,6 +33,8 @@ pub struct NetworkFacts {
     pub static_peers: Vec<String>,
     /// Warnings about variables.
     pub warnings: Vec<String>,
+    /// Error of joining the graph.
+    pub error: Option<String>,
     /// Variables of Fast DDS that are set; Cyclone does not read them.
     pub fast_dds_settings: Vec<String>,
 }

@@ -23,11 +23,16 @@ pub fn interfaces() -> Vec<Interface> {
     let Ok(all) = fs::read_dir("/sys/class/net") else {
         return Vec::new();
     };
+    // `/sys` may be of another network namespace.
+    let here = fs::read_to_string("/proc/net/dev").unwrap_or_default();
+    let here = here.lines().filter_map(|line| line.split_once(':'));
+    let here: Vec<&str> = here.map(|(name, _)| name.trim()).collect();
     let interface = |entry: fs::DirEntry| {
         let flags = fs::read_to_string(entry.path().join("flags")).ok()?;
         let flags = u32::from_str_radix(flags.trim().trim_start_matches("0x"), 16).ok()?;
         let name = entry.file_name().to_string_lossy().into_owned();
-        (flags & UP != 0).then_some(Interface {
+        let is_here = here.contains(&name.as_str());
+        (is_here && flags & UP != 0).then_some(Interface {
             name,
             is_loopback: flags & LOOPBACK != 0,
             has_multicast: flags & MULTICAST != 0,

@@ -70,10 +70,10 @@ impl Doctor {
         let settings = settings(&network);
         // They are findings.
         network.warnings.clear();
-        let runtime = Runtime::with_transport(NAME, args, &network)?;
-        let node = runtime.node(NAME)?;
-        let facts = collect(&node, settings)?;
-        drop(runtime);
+        let facts = match Runtime::with_transport(NAME, args, &network) {
+            Ok(runtime) => collect(&runtime.node(NAME)?, settings)?,
+            Err(error) => alone(settings, &error.to_string()),
+        };
         let findings = findings::findings(&facts);
         match self.json {
             true => println!("{}", page::json(&findings, &facts)?),
@@ -102,7 +102,26 @@ fn settings(network: &Network) -> NetworkFacts {
         },
         static_peers: network.static_peers.clone(),
         warnings: network.warnings.clone(),
+        error: None,
         fast_dds_settings: fast_dds.map(|name| (*name).to_owned()).collect(),
+    }
+}
+
+/// Facts of a machine that cannot join the graph.
+fn alone(mut network: NetworkFacts, error: &str) -> Facts {
+    network.error = Some(error.to_owned());
+    let is_on_subnet = network.is_dds() && network.range == Range::Subnet;
+    Facts {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        machine: Machine {
+            interfaces: machine::interfaces(),
+            multicast_error: is_on_subnet.then(machine::multicast_error).flatten(),
+            rmem_max: machine::rmem_max(),
+            processes: processes::in_domains(),
+            ..Machine::default()
+        },
+        network,
+        ..Facts::default()
     }
 }
 

@@ -6,6 +6,7 @@ mod beside_nav2;
 mod browser;
 mod calibrate;
 mod demo;
+mod doctor;
 mod driver_logs;
 mod evaluate;
 mod files;

@@ -52,34 +52,59 @@ fn types(topic: &str, endpoints: &[&Endpoint]) -> Option<Finding> {
     })
 }
 
+/// A policy in which an offer is less than a request.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Policy {
+    name: &'static str,
+    parameter: &'static str,
+    requested: &'static str,
+    offered: &'static str,
+}
+
+const RELIABILITY: Policy = Policy {
+    name: "RELIABILITY",
+    parameter: "reliability",
+    requested: "reliable",
+    offered: "best_effort",
+};
+const DURABILITY: Policy = Policy {
+    name: "DURABILITY",
+    parameter: "durability",
+    requested: "transient_local",
+    offered: "volatile",
+};
+
 /// Policies of a publisher and a subscription that cannot match.
 fn qos(topic: &str, endpoints: &[&Endpoint]) -> Vec<Finding> {
     let of = |role| endpoints.iter().copied().filter(move |of| of.role == role);
-    let mut pairs = BTreeMap::new();
+    let mut pairs: BTreeMap<Policy, [BTreeSet<&str>; 2]> = BTreeMap::new();
     for subscription in of(Subscriber) {
         for publisher in of(Publisher).filter(|of| of.type_name == subscription.type_name) {
             let policy = if subscription.is_reliable && !publisher.is_reliable {
-                ("RELIABILITY", "reliability", "reliable", "best_effort")
+                RELIABILITY
             } else if subscription.is_transient_local && !publisher.is_transient_local {
-                ("DURABILITY", "durability", "transient_local", "volatile")
+                DURABILITY
             } else {
                 continue;
             };
-            let (publishers, subscriptions): &mut (BTreeSet<_>, BTreeSet<_>) =
-                pairs.entry(policy).or_default();
-            publishers.insert(publisher.node.as_str());
-            subscriptions.insert(subscription.node.as_str());
+            let [publishers, subscriptions] = pairs.entry(policy).or_default();
+            publishers.insert(&publisher.node);
+            subscriptions.insert(&subscription.node);
         }
     }
-    let finding = |((policy, parameter, requested, offered), (publishers, subscriptions)): (
-        (&str, &str, &str, &str),
-        (BTreeSet<&str>, BTreeSet<&str>),
-    )| {
-        Finding::new(
+    let mut found = Vec::new();
+    for (policy, [publishers, subscriptions]) in pairs {
+        let Policy {
+            name,
+            parameter,
+            requested,
+            offered,
+        } = policy;
+        found.push(Finding::new(
             Error,
             "QoS",
             format!(
-                "{topic}: {} requests {requested}, {} offers {offered} ({policy}): no message passes",
+                "{topic}: {} requests {requested}, {} offers {offered} ({name}): no message passes",
                 list(subscriptions),
                 list(publishers)
             ),
@@ -87,9 +112,9 @@ fn qos(topic: &str, endpoints: &[&Endpoint]) -> Vec<Finding> {
                 "of a Lattice node: -p qos.{topic}.{parameter}:={offered} of the subscription, or :={requested} of the \
                  publisher; otherwise its own QoS"
             ),
-        )
-    };
-    pairs.into_iter().map(finding).collect()
+        ));
+    }
+    found
 }
 
 /// Types whose definition is another one than here.

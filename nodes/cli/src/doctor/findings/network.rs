@@ -17,6 +17,11 @@ pub fn findings(facts: &Facts) -> Vec<Finding> {
         let remedy = "set the variable to a value that docs/transport.md names, or unset it";
         Finding::new(Warn, "environment", warning, remedy)
     }));
+    found.extend(facts.network.error.iter().map(|error| {
+        let remedy = "enable a network interface; on this machine alone: export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST; \
+            check CYCLONEDDS_URI or the configuration of Zenoh";
+        Finding::new(Error, "transport", error, remedy)
+    }));
     if facts.network.is_dds() {
         found.extend(multicast(facts));
         found.extend(ranges(facts));

@@ -200,6 +200,11 @@ fn without_multicast_other_machines_are_not_discovered() {
         "multicast",
         &["Network is unreachable"],
     );
+    let failed = |facts: &mut Facts| {
+        facts.network.error = Some("no interface".to_owned());
+        facts.endpoints.clear();
+    };
+    names(failed, Severity::Error, "transport", &["no interface"]);
     let with_peers = |facts: &mut Facts| {
         none(facts);
         facts.network.static_peers = vec!["10.0.0.2".to_owned()];
