@@ -72,6 +72,7 @@ mod tf;
 mod tf_guard;
 mod timer;
 mod type_description;
+mod type_versions;
 
 pub use action::{ActionLimits, ActionServer, Feedback, GoalHandle};
 pub use clock::Clock;

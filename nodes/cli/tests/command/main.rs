@@ -27,6 +27,7 @@ mod record;
 mod respawn;
 mod signals;
 mod streams;
+mod versions;
 mod viewer;
 mod viewer_foreign;
 mod viewer_headset;

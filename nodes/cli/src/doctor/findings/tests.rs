@@ -305,6 +305,16 @@ fn clocks_differ() {
     };
     let words = ["/points (of /lidar) are 60 min ahead of the clock of this machine"];
     names(hour, Severity::Error, "clock", &words);
+    let mut two = sound();
+    two.time.stamps = vec![
+        stamps("/a", 3600.2),
+        stamps("/b", 3601.0),
+        stamps("/c", -9.0),
+    ];
+    let problems: Vec<String> = findings(&two).into_iter().map(|of| of.problem).collect();
+    assert_eq!(problems.len(), 2, "{problems:?}");
+    assert!(problems[0].starts_with("stamps on /c"), "{problems:?}");
+    assert!(problems[1].starts_with("stamps on /a, /b"), "{problems:?}");
     let played = |facts: &mut Facts| {
         facts.time.simulated_s = Some(-1e6);
         facts.time.stamps = vec![stamps("/points", 1e6), stamps("/rosout", 1e6)];

@@ -1,10 +1,10 @@
 //! Clocks and transforms.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use lattice_runtime::GraphRole::Publisher;
 
-use super::super::facts::{Facts, Frame};
+use super::super::facts::{Facts, Frame, Stamps};
 use super::Severity::Error;
 use super::{Finding, list};
 
@@ -22,8 +22,8 @@ pub fn findings(facts: &Facts) -> Vec<Finding> {
     found
 }
 
-/// Stamps that are far from the clock.
-fn clocks(facts: &Facts) -> Option<Finding> {
+/// Stamps that are far from the clock, a finding for each clock.
+fn clocks(facts: &Facts) -> Vec<Finding> {
     let time = &facts.time;
     let (reference, remedy) = match time.simulated_s {
         None => (
@@ -35,36 +35,38 @@ fn clocks(facts: &Facts) -> Option<Finding> {
             "set use_sim_time of their nodes, or end the player that publishes /clock",
         ),
     };
-    let mut topics: BTreeMap<i64, BTreeSet<&str>> = BTreeMap::new();
-    for of in &time.stamps {
-        // Nodes may log in system time beside a played log.
-        let is_exempt = time.simulated_s.is_some() && OF_NODES.contains(&of.topic.as_str());
-        if of.offset_s.abs() > MAX_OFFSET_S && !is_exempt {
-            let seconds = of.offset_s.round() as i64;
-            topics.entry(seconds).or_default().insert(&of.topic);
-        }
-    }
-    let (seconds, names) = topics
-        .iter()
-        .max_by_key(|(seconds, of)| (of.len(), **seconds))?;
-    let nodes: BTreeSet<&str> = facts
-        .endpoints
-        .iter()
-        .filter(|of| of.role == Publisher && names.contains(of.topic.as_str()))
-        .map(|of| of.node.as_str())
-        .collect();
-    Some(Finding::new(
-        Error,
-        "clock",
-        format!(
-            "stamps on {} (of {}) are {} {} {reference}",
-            list(names.iter().copied()),
-            list(nodes),
-            duration(*seconds),
-            if *seconds < 0 { "behind" } else { "ahead of" },
-        ),
-        remedy,
-    ))
+    // Nodes may log in system time beside a played log.
+    let is_exempt =
+        |of: &Stamps| time.simulated_s.is_some() && OF_NODES.contains(&of.topic.as_str());
+    let is_off = |of: &&Stamps| of.offset_s.abs() > MAX_OFFSET_S && !is_exempt(of);
+    let mut off: Vec<&Stamps> = time.stamps.iter().filter(is_off).collect();
+    off.sort_by(|a, b| a.offset_s.total_cmp(&b.offset_s));
+    let is_same = |a: &&Stamps, b: &&Stamps| b.offset_s - a.offset_s < MAX_OFFSET_S;
+    let finding = |of: &[&Stamps]| {
+        let seconds = of.first().map_or(0, |of| of.offset_s.round() as i64);
+        let topics: BTreeSet<&str> = of.iter().map(|of| of.topic.as_str()).collect();
+        let nodes = publishers(facts, |topic| topics.contains(topic));
+        Finding::new(
+            Error,
+            "clock",
+            format!(
+                "stamps on {} (of {}) are {} {} {reference}",
+                list(topics),
+                list(nodes),
+                duration(seconds),
+                if seconds < 0 { "behind" } else { "ahead of" },
+            ),
+            remedy,
+        )
+    };
+    off.chunk_by(is_same).map(finding).collect()
+}
+
+/// Nodes that publish these topics.
+fn publishers(facts: &Facts, is_wanted: impl Fn(&str) -> bool) -> BTreeSet<&str> {
+    let all = facts.endpoints.iter();
+    let of_topics = all.filter(|of| of.role == Publisher && is_wanted(&of.topic));
+    of_topics.map(|of| of.node.as_str()).collect()
 }
 
 /// Transforms with old stamps, unless the clock of their publisher explains them.
@@ -82,12 +84,7 @@ fn stale(facts: &Facts) -> Option<Finding> {
     let old: Vec<(&str, f64)> = old.collect();
     let largest = old.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
     let (is_old, seconds) = (largest.1 < 0.0, largest.1.round() as i64);
-    let nodes: BTreeSet<&str> = facts
-        .endpoints
-        .iter()
-        .filter(|of| of.role == Publisher && of.topic == "/tf")
-        .map(|of| of.node.as_str())
-        .collect();
+    let nodes = publishers(facts, |topic| topic == "/tf");
     Some(Finding::new(
         Error,
         "tf",
