@@ -141,7 +141,7 @@ fn map_contents(bytes: &[u8]) -> Value {
     json!({
         "voxels": list.len(),
         "points": list.distortion().points,
-        "cell_volume_m3": list.lattice().cell_volume(),
+        "cell_volume_m3": list.lattice().cell_volume_m3(),
         "datum_index": [datum[0], datum[1], datum[2]],
         "rows": digest(rows.as_bytes()),
     })

@@ -34,7 +34,9 @@ fn another_version_of_the_map_is_named_and_both_continue() {
     expect(&mut mapper, &[line]);
 
     let (sender, maps) = channel();
-    let on_map = move |map: Arc<LatticeMap>| drop(sender.send(map.voxels_total));
+    let on_map = move |map: Arc<LatticeMap>| {
+        let _ = sender.send(map.voxels_total);
+    };
     let shared = SubscriptionExecutor::Shared;
     let _maps = node
         .subscribe("voxel_map", Qos::MAP, shared, on_map)
