@@ -9,7 +9,7 @@ mod page;
 mod processes;
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -142,9 +142,11 @@ fn collect(node: &Node, network: NetworkFacts) -> CliResult<Facts> {
     thread::sleep(RECEPTION);
     let (endpoints, time) = (endpoints(), messages.facts());
     let processes = processes::in_domains();
+    let here = processes.iter().filter(|of| of.domain == network.domain);
+    let folders: Vec<&Path> = here.filter_map(|of| of.folder.as_deref()).collect();
     Ok(Facts {
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        map_dirs: map_dirs(node, &endpoints, &processes),
+        map_dirs: map_dirs(node, &endpoints, &folders),
         machine: Machine {
             interfaces: machine::interfaces(),
             multicast_error,
@@ -158,8 +160,8 @@ fn collect(node: &Node, network: NetworkFacts) -> CliResult<Facts> {
     })
 }
 
-/// Folders of the maps of all nodes that save maps.
-fn map_dirs(node: &Node, endpoints: &[Endpoint], processes: &[facts::Process]) -> Vec<MapDir> {
+/// Folders of the maps of all nodes that save maps; relative ones are looked up in `folders`.
+fn map_dirs(node: &Node, endpoints: &[Endpoint], folders: &[&Path]) -> Vec<MapDir> {
     let savers = endpoints
         .iter()
         .filter(|of| of.role == GraphRole::Server && of.topic.ends_with("/save_map"));
@@ -169,10 +171,9 @@ fn map_dirs(node: &Node, endpoints: &[Endpoint], processes: &[facts::Process]) -
         let patience = end.saturating_duration_since(Instant::now());
         let path = map_dir(node, name, patience)?;
         // Relative to the working directory of its process.
-        let folders = processes.iter().filter_map(|of| of.folder.as_ref());
         let candidates: Vec<PathBuf> = match path.is_absolute() {
             true => vec![path.clone()],
-            false => folders.map(|folder| folder.join(&path)).collect(),
+            false => folders.iter().map(|folder| folder.join(&path)).collect(),
         };
         let free = candidates
             .iter()

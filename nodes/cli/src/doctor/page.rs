@@ -6,7 +6,7 @@ use std::fmt::Write;
 use lattice_runtime::GraphRole::{Publisher, Subscriber};
 use serde_json::json;
 
-use super::facts::{Endpoint, Facts};
+use super::facts::{Endpoint, Facts, Process};
 use super::findings::Finding;
 
 /// Rows of nodes and topics.
@@ -70,23 +70,21 @@ fn rows(facts: &Facts) -> Vec<(&'static str, String)> {
         |bytes| format!("net.core.rmem_max {bytes} bytes"),
     );
     rows.push(("receive buffer", buffer));
-    for process in &machine.processes {
+    let process = |process: &Process| {
         let range = process.range.as_deref().unwrap_or("SUBNET");
-        let text = format!(
-            "{}, domain {}, range {range}",
-            process.title(),
-            process.domain
-        );
-        rows.push(("process", text));
-    }
+        let (title, domain) = (process.title(), process.domain);
+        format!("{title}, domain {domain}, range {range}")
+    };
+    let processes = machine.processes.iter().map(process);
+    rows.extend(capped("process", processes.collect()));
     let clock = facts.time.simulated_s.map_or_else(
         || "no /clock".to_owned(),
         |seconds| format!("/clock is {seconds:+.3} s from the clock of this machine"),
     );
     rows.push(("clock", clock));
-    for of in &facts.time.stamps {
-        rows.push(("stamps", format!("{} {:+.3} s", of.topic, of.offset_s)));
-    }
+    let stamps = facts.time.stamps.iter();
+    let stamps = stamps.map(|of| format!("{} {:+.3} s", of.topic, of.offset_s));
+    rows.extend(capped("stamps", stamps.collect()));
     for of in &facts.map_dirs {
         let free = of.free_bytes.map_or_else(
             || "not on this machine".to_owned(),
@@ -161,4 +159,33 @@ fn unconnected(endpoints: &[Endpoint]) -> Vec<String> {
         }
     };
     topics.into_iter().filter_map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::doctor::facts::Stamps;
+
+    #[test]
+    fn findings_come_before_facts_and_long_lists_end() {
+        let mut facts = Facts::default();
+        let stamps = |i| Stamps {
+            topic: format!("/points{i}"),
+            offset_s: -0.5,
+        };
+        facts.time.stamps = (0..30).map(stamps).collect();
+        let page = text(&[], &facts);
+        assert!(page.starts_with("nothing found\n\nversion "), "{page}");
+        assert!(
+            page.contains("stamps           /points0 -0.500 s\n"),
+            "{page}"
+        );
+        assert!(
+            page.contains("stamps           and 10 more (--json)\n"),
+            "{page}"
+        );
+        let all: serde_json::Value = serde_json::from_str(&json(&[], &facts).unwrap()).unwrap();
+        let stamps = all["facts"]["time"]["stamps"].as_array();
+        assert_eq!(stamps.map(Vec::len), Some(30));
+    }
 }
