@@ -10,6 +10,7 @@ mod bag;
 mod calendar;
 mod calibrate;
 mod cell_size;
+mod doctor;
 mod fleet;
 mod health;
 #[cfg(feature = "lab")]
@@ -56,6 +57,8 @@ enum Command {
     Node(node::NodeCommand),
     /// Fail unless nodes are running and healthy, by their diagnostics; for health checks of containers
     Health(health::Health),
+    /// Find out why nodes do not discover each other or receive no messages
+    Doctor(doctor::Doctor),
     /// Create a link to this program for every node; called by that name, it runs the node
     Link(link::Link),
     /// Map a rosbag2 log: in this process, or played to separate node processes
@@ -112,6 +115,7 @@ impl Command {
             Command::View(command) => command.run(),
             Command::Node(command) => command.run(),
             Command::Health(command) => command.run(),
+            Command::Doctor(command) => command.run(),
             Command::Link(command) => command.run(),
             #[cfg(feature = "bags")]
             Command::Replay(command) => command.run(),

@@ -8,7 +8,7 @@ use lattice_msgs::rmw_dds_common::{NodeEntitiesInfo, ParticipantEntitiesInfo};
 
 use super::names;
 use super::port::EndpointId;
-use super::remote::GraphRole;
+use super::remote::{Announced, GraphRole};
 use super::sync::lock;
 
 /// Limit of stored endpoints.
@@ -28,27 +28,58 @@ pub struct GraphEndpoint {
     pub node: String,
 }
 
+/// A publisher, subscription or server of another process, with what it announces.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RemoteEndpoint {
+    /// Role, topic and node.
+    pub endpoint: GraphEndpoint,
+    /// Type and QoS; `None` of a server.
+    pub announced: Option<Announced>,
+    /// GUID prefix of its participant in hexadecimal, which begins with the id of the DDS vendor; `None` on Zenoh.
+    pub participant: Option<String>,
+}
+
 /// Discovered endpoints by GUID.
 #[derive(Default)]
 pub(crate) struct DiscoveredGraph(Mutex<DiscoveredEndpoints>);
 
 #[derive(Default)]
 struct DiscoveredEndpoints {
-    endpoints: BTreeMap<EndpointId, (GraphRole, String)>,
+    endpoints: BTreeMap<EndpointId, Known>,
     /// Full node name of each endpoint.
     nodes: BTreeMap<EndpointId, String>,
 }
 
+struct Known {
+    role: GraphRole,
+    name: String,
+    announced: Option<Announced>,
+    /// True if its identity is a GUID of DDS.
+    is_dds: bool,
+}
+
 impl DiscoveredGraph {
-    /// Adds or updates an endpoint.
-    pub(crate) fn add(&self, id: EndpointId, role: GraphRole, name: &str, node: Option<String>) {
+    /// Adds or updates an endpoint. Transports that know its node are not DDS.
+    pub(crate) fn add(
+        &self,
+        id: EndpointId,
+        (role, name): (GraphRole, &str),
+        announced: Option<Announced>,
+        node: Option<String>,
+    ) {
         let known = &mut *lock(&self.0);
         if name.len() > MAX_NAME_BYTES
             || (known.endpoints.len() >= MAX_ENDPOINTS && !known.endpoints.contains_key(&id))
         {
             return;
         }
-        known.endpoints.insert(id, (role, name.to_owned()));
+        let endpoint = Known {
+            role,
+            name: name.to_owned(),
+            announced,
+            is_dds: node.is_none(),
+        };
+        known.endpoints.insert(id, endpoint);
         if let Some(node) = node.filter(|node| node.len() <= MAX_NAME_BYTES) {
             known.nodes.insert(id, node);
         }
@@ -100,11 +131,21 @@ impl DiscoveredGraph {
 
     /// All known endpoints.
     pub(crate) fn all(&self) -> Vec<GraphEndpoint> {
+        let all = self.all_announced();
+        all.into_iter().map(|of| of.endpoint).collect()
+    }
+
+    /// All known endpoints with what they announce.
+    pub(crate) fn all_announced(&self) -> Vec<RemoteEndpoint> {
         let known = lock(&self.0);
-        let endpoint = |(id, (role, name)): (&EndpointId, &(GraphRole, String))| GraphEndpoint {
-            role: *role,
-            name: name.clone(),
-            node: known.nodes.get(id).cloned().unwrap_or_else(|| id.hex()),
+        let endpoint = |(id, of): (&EndpointId, &Known)| RemoteEndpoint {
+            endpoint: GraphEndpoint {
+                role: of.role,
+                name: of.name.clone(),
+                node: known.nodes.get(id).cloned().unwrap_or_else(|| id.hex()),
+            },
+            announced: of.announced.clone(),
+            participant: of.is_dds.then(|| id.hex().chars().take(24).collect()),
         };
         known.endpoints.iter().map(endpoint).collect()
     }
@@ -137,7 +178,7 @@ mod tests {
     #[test]
     fn endpoints_are_of_the_nodes_that_their_participant_names() {
         let all = DiscoveredGraph::default();
-        all.add(WRITER, GraphRole::Publisher, "/map", None);
+        all.add(WRITER, (GraphRole::Publisher, "/map"), None, None);
         assert_eq!(all.all()[0].node, "07".repeat(16));
         all.on_message(&message(9, WRITER.0)).unwrap();
         assert_eq!(all.all()[0].node, "07".repeat(16), "said by another");
@@ -165,13 +206,13 @@ mod tests {
             assert!(all.on_message(&whole[..length]).is_err(), "{length}");
         }
         let long = "x".repeat(MAX_NAME_BYTES + 1);
-        all.add(WRITER, GraphRole::Publisher, &long, None);
+        all.add(WRITER, (GraphRole::Publisher, &long), None, None);
         assert!(all.all().is_empty());
         for i in 0..=MAX_ENDPOINTS as u128 {
             all.add(
                 EndpointId(i.to_le_bytes()),
-                GraphRole::Subscriber,
-                "/a",
+                (GraphRole::Subscriber, "/a"),
+                None,
                 None,
             );
         }

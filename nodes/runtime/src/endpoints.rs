@@ -11,8 +11,9 @@ use super::discovered_graph::DiscoveredGraph;
 use super::output_types::OutputTypes;
 use super::peers::Peers;
 use super::port::{EndpointId, PortEvent};
-use super::remote::{GraphRole, RemotePublisher};
+use super::remote::{Announced, GraphRole, RemotePublisher};
 use super::sync::lock;
+use super::type_versions::TypeVersions;
 
 /// Limit of stored events for endpoints that are not registered yet.
 const MAX_EARLY_EVENTS: usize = 1024;
@@ -26,6 +27,7 @@ pub(crate) struct Endpoints {
     pub remotes: Remotes,
     pub discovered_graph: DiscoveredGraph,
     outputs: OutputTypes,
+    versions: TypeVersions,
     inner: Mutex<Inner>,
 }
 
@@ -83,7 +85,10 @@ impl Endpoints {
                 node,
             } => {
                 let (role, topic) = (GraphRole::Publisher, &publisher.topic);
-                self.discovered_graph.add(peer, role, topic, node);
+                let announced = Announced::from(&*publisher);
+                self.warn_of_version(topic, &announced, node.as_deref());
+                let (of, announced) = ((role, topic.as_str()), Some(announced));
+                self.discovered_graph.add(peer, of, announced, node);
                 // Added first, so that an output created meanwhile finds it.
                 self.remotes.add(peer, (*publisher).clone());
                 for line in self.outputs.on_found(&publisher) {
@@ -95,8 +100,15 @@ impl Endpoints {
                 peer,
                 role,
                 name,
+                announced,
                 node,
-            } => return self.discovered_graph.add(peer, role, &name, node),
+            } => {
+                let announced = announced.map(|announced| *announced);
+                if let Some(announced) = &announced {
+                    self.warn_of_version(&name, announced, node.as_deref());
+                }
+                return (self.discovered_graph).add(peer, (role, &name), announced, node);
+            }
             PortEvent::Lost { peer: lost } => return self.lost(|peer| *peer == lost),
         };
         let change = Change { peer, incompatible };
@@ -112,6 +124,12 @@ impl Endpoints {
         drop(inner);
         if let Some(peers) = peers {
             apply(&peers, change);
+        }
+    }
+
+    fn warn_of_version(&self, topic: &str, announced: &Announced, node: Option<&str>) {
+        if let Some(line) = self.versions.on_found(topic, announced, node) {
+            log::warn!("{line}");
         }
     }
 

@@ -12,7 +12,7 @@ use futures::stream::BoxStream;
 
 use super::error::RuntimeError;
 use super::qos::Qos;
-use super::remote::{GraphRole, RemotePublisher};
+use super::remote::{Announced, GraphRole, RemotePublisher};
 
 /// Sample buffer shared by writers.
 pub(crate) use bytes::Bytes;
@@ -181,6 +181,8 @@ pub(crate) enum PortEvent {
         peer: EndpointId,
         role: GraphRole,
         name: String,
+        /// Type and QoS of a subscription.
+        announced: Option<Box<Announced>>,
         /// Its node, if announced.
         node: Option<String>,
     },

@@ -16,6 +16,47 @@ pub enum GraphRole {
     Server,
 }
 
+/// Type and QoS of a publisher or subscription, as announced.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Announced {
+    /// Type, such as `tf2_msgs/msg/TFMessage`.
+    pub type_name: String,
+    /// Type hash (`RIHS01_...`), if announced.
+    pub type_hash: Option<String>,
+    /// Offered or requested reliability.
+    pub reliability: Reliability,
+    /// Offered or requested durability.
+    pub durability: Durability,
+}
+
+impl Announced {
+    /// Type and QoS of an endpoint; `None` if the type is not a ROS type.
+    pub(crate) fn of(
+        dds_type: &str,
+        hash: Option<&str>,
+        (reliability, durability): (Reliability, Durability),
+    ) -> Option<Self> {
+        let is_short = dds_type.len() <= MAX_NAME_BYTES;
+        Some(Self {
+            type_name: is_short.then(|| ros_type(dds_type))??,
+            type_hash: hash.filter(|hash| is_type_hash(hash)).map(str::to_owned),
+            reliability,
+            durability,
+        })
+    }
+}
+
+impl From<&RemotePublisher> for Announced {
+    fn from(publisher: &RemotePublisher) -> Self {
+        Self {
+            type_name: publisher.type_name.clone(),
+            type_hash: publisher.type_hash.clone(),
+            reliability: publisher.reliability,
+            durability: publisher.durability,
+        }
+    }
+}
+
 /// A publisher in another process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RemotePublisher {
@@ -74,7 +115,7 @@ fn ros_type(dds_type: &str) -> Option<String> {
 }
 
 /// Value of `typehash` in USER_DATA, in the format of rmw_dds_common.
-fn announced_hash(user_data: &[u8]) -> Option<String> {
+pub(crate) fn announced_hash(user_data: &[u8]) -> Option<String> {
     let text = std::str::from_utf8(user_data).ok()?;
     let mut pairs = text.split(';').filter_map(|pair| pair.split_once('='));
     let (_, hash) = pairs.find(|(key, _)| *key == "typehash")?;

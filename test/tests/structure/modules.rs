@@ -21,7 +21,7 @@ const LAYERS: [(&str, &str); 3] = [
     (
         "nodes/runtime/src",
         "sync names param_value params_file ros_args params security env logging qos error shutdown \
-         task_thread timer clock diagnostics loopback_domain remote port arrivals gaps confine cyclone rmw_zenoh peers output_types lifecycle_gate discovered_graph endpoints outbox \
+         task_thread timer clock diagnostics loopback_domain remote port arrivals gaps confine cyclone rmw_zenoh peers output_types type_versions lifecycle_gate discovered_graph endpoints outbox \
          graph local_bus publisher subscription service rosout shared node param_services \
          logger_services type_description action tf_guard tf lifecycle process",
     ),

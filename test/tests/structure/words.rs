@@ -21,10 +21,11 @@ const SHORT: [(&str, usize); 2] = [
 ];
 
 /// Pages outside of the folders of pages.
-const FRONT: [&str; 7] = [
+const FRONT: [&str; 8] = [
     "README.md",
     "CONTRIBUTING.md",
     "RELEASING.md",
+    "SECURITY.md",
     "lattice_core/README.md",
     "msgs/README.md",
     "nodes/bag/README.md",

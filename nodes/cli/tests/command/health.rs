@@ -82,7 +82,7 @@ fn health_is_what_nodes_say_of_themselves() {
 }
 
 /// A cloud of one point.
-fn cloud(frame: &str) -> PointCloud2 {
+pub fn cloud(frame: &str) -> PointCloud2 {
     let data = [1.0_f32, 2.0, 3.0].map(f32::to_le_bytes).concat();
     let fields = cloud::xyz_fields(PointField::FLOAT32, 4);
     cloud::dense_cloud(geometry::header(frame, 1), fields, 12, 1, data)

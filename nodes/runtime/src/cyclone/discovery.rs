@@ -21,7 +21,7 @@ use super::qos::{announced, user_data};
 use super::unauthenticated_participants::UnauthenticatedParticipants;
 use crate::port::{DURABILITY_CONFLICT, EndpointId, PortEvent, RELIABILITY_CONFLICT};
 use crate::qos::{Durability, Reliability};
-use crate::remote::RemotePublisher;
+use crate::remote::{Announced, GraphRole, RemotePublisher, announced_hash};
 use crate::sync::lock;
 
 /// Endpoints taken per call.
@@ -44,6 +44,17 @@ struct Other<'a> {
     type_name: &'a CStr,
     qos: Option<(Reliability, Durability)>,
     user_data: Vec<u8>,
+}
+
+impl Other<'_> {
+    /// Type and QoS of a subscription; a policy that is not announced has its default of DDS.
+    fn announced(&self) -> Option<Announced> {
+        let qos = self
+            .qos
+            .unwrap_or((Reliability::BestEffort, Durability::Volatile));
+        let hash = announced_hash(&self.user_data);
+        Announced::of(self.type_name.to_str().ok()?, hash.as_deref(), qos)
+    }
 }
 
 impl Discovery {
@@ -124,10 +135,15 @@ impl Discovery {
     fn found_reader(&self, other: &Other<'_>) {
         let name = other.name.to_str().ok();
         if let Some((role, name)) = name.and_then(|name| role(Side::Reader, name)) {
+            let announced = match role {
+                GraphRole::Subscriber => other.announced(),
+                _ => None,
+            };
             let _ = self.events.try_send(PortEvent::FoundOther {
                 peer: other.id,
                 role,
                 name: name.to_owned(),
+                announced: announced.map(Box::new),
                 node: None,
             });
         }

@@ -10,7 +10,7 @@ use lattice_msgs::RosMessage;
 use self::expected::Expected;
 use super::clock::Clock;
 use super::diagnostics::Diagnostics;
-use super::discovered_graph::GraphEndpoint;
+use super::discovered_graph::{GraphEndpoint, RemoteEndpoint};
 use super::error::RuntimeError;
 use super::graph::NodeId;
 use super::lifecycle_gate::LifecycleGate;
@@ -264,6 +264,12 @@ impl Node {
     /// arrive soon after the first call.
     pub fn graph(&self) -> Vec<GraphEndpoint> {
         self.inner.shared.graph_of_all()
+    }
+
+    /// Known publishers, subscriptions and servers of other processes with their types and QoS. Node names arrive
+    /// soon after the first call.
+    pub fn remote_endpoints(&self) -> Vec<RemoteEndpoint> {
+        self.inner.shared.remote_endpoints()
     }
 
     fn subscribe_samples<M: RosMessage>(

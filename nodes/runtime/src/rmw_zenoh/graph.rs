@@ -10,7 +10,7 @@ use smol::channel::Sender;
 use super::keys::{ANY_HASH, Channel, Kind, Token, gid, read_token};
 use crate::logging::Throttle;
 use crate::port::{EndpointId, PortEvent};
-use crate::remote::{GraphRole, RemotePublisher};
+use crate::remote::{Announced, GraphRole, RemotePublisher};
 use crate::sync::lock;
 
 /// Limit of stored endpoints of other sessions.
@@ -124,10 +124,18 @@ impl Graph {
             Kind::Server => GraphRole::Server,
             Kind::Client => return,
         };
+        let announced = match role {
+            GraphRole::Subscriber => {
+                let (of, qos) = (&token.channel, (token.reliability, token.durability));
+                Announced::of(&of.dds_type, of.hash.as_deref(), qos)
+            }
+            _ => None,
+        };
         self.send(PortEvent::FoundOther {
             peer,
             role,
             name,
+            announced: announced.map(Box::new),
             node,
         });
     }

@@ -98,6 +98,15 @@ impl Client {
             or(client.call(request), late).await
         }
     }
+
+    /// Calls as [`Client::call`], and blocks until the reply. Not from a handler, callback or timer.
+    pub fn call_blocking(
+        &self,
+        request: Vec<u8>,
+        patience: Duration,
+    ) -> Result<Vec<u8>, CallError> {
+        smol::block_on(self.call(request, patience))
+    }
 }
 
 impl Inner {

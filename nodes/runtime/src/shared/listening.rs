@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::Shared;
-use crate::discovered_graph::GraphEndpoint;
+use crate::discovered_graph::{GraphEndpoint, RemoteEndpoint};
 use crate::endpoints::Endpoints;
 use crate::port::{GRAPH_TOPIC, SampleReader};
 use crate::sync::lock;
@@ -12,6 +12,19 @@ impl Shared {
     /// Known publishers, subscriptions and servers of all processes. The first call subscribes to the node lists
     /// of other processes.
     pub(crate) fn graph_of_all(self: &Arc<Self>) -> Vec<GraphEndpoint> {
+        self.listen_to_graph();
+        let mut all = self.graph.all();
+        all.extend(self.endpoints.discovered_graph.all());
+        all
+    }
+
+    /// Known endpoints of other processes; otherwise as [`Shared::graph_of_all`].
+    pub(crate) fn remote_endpoints(self: &Arc<Self>) -> Vec<RemoteEndpoint> {
+        self.listen_to_graph();
+        self.endpoints.discovered_graph.all_announced()
+    }
+
+    fn listen_to_graph(self: &Arc<Self>) {
         if let Some(open) = lock(&self.open).as_mut()
             && open.graph_of_others.is_none()
         {
@@ -24,9 +37,6 @@ impl Shared {
                 }
             };
         }
-        let mut all = self.graph.all();
-        all.extend(self.endpoints.discovered_graph.all());
-        all
     }
 }
 

@@ -54,6 +54,11 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     ),
     (
         "*",
+        "lattice doctor",
+        NotHere("finds what is wrong with the machine; doctor.rs"),
+    ),
+    (
+        "*",
         "lattice evaluate",
         NotHere("takes minutes to hours; evaluate.rs"),
     ),
