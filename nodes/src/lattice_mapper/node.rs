@@ -290,7 +290,7 @@ impl ComputeState {
             undecodable: self.inputs.undecodable(),
             updates_not_published: self.output.updates_lost(),
             chunks_not_published: self.output.chunks_lost(),
-            ..MapperReport::of(&mut self.machine)
+            ..MapperReport::of(&self.machine)
         }
     }
 
@@ -373,7 +373,7 @@ impl ComputeState {
         let (clouds, voxels) = (self.machine.counts().clouds_in, self.machine.cells().len());
         let points = self.machine.distortion().points;
         log::info!("{clouds} clouds, {points} points in {voxels} voxels");
-        // Only computed for a report: a keyframe of millions of voxels takes seconds.
+        // Only computed for a report: sorting tens of millions of keys takes a second.
         if self.report_file.is_empty() {
             return;
         }
