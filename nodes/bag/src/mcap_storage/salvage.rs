@@ -171,7 +171,7 @@ pub(super) fn span_at(file: &mut File, start: u64) -> io::Result<Option<(u64, u6
     Ok(chunk_span(window.at(start, CHUNK_SPAN_BYTES)?))
 }
 
-/// The same between two bytes of a source, which may be the content of a chunk with a known span of log times.
+/// Blocks of messages between two bytes of a source, such as the content of a chunk with a known span of log times.
 pub(super) fn messages_within<V>(
     source: &mut (impl Read + Seek),
     (start, end): (u64, u64),

@@ -26,6 +26,7 @@ mod record;
 mod respawn;
 mod signals;
 mod streams;
+mod unsent;
 mod viewer;
 mod viewer_foreign;
 mod viewer_headset;

@@ -85,18 +85,24 @@ fn interrupted(mut node: Child, report: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(report).unwrap()).unwrap()
 }
 
-#[test]
-fn a_mapper_of_two_million_voxels_ends_in_time_with_its_report() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name).display().to_string();
+/// Writes the map of a cube of points 1 m apart as the autosave of a mapper; the number of its voxels.
+pub fn grid_map(folder: &Path, edge: u32) -> u64 {
+    let path = |name: &str| folder.join(name).display().to_string();
     let (points, map) = (path("grid.bin"), path("autosave.lattice"));
-    let place = |i: u32| [i % 128, i / 128 % 128, i / 16_384].map(|v| v as f32 + 0.3);
-    let cells = 1_u32 << 21;
-    let numbers = (0..cells).flat_map(|i| place(i).into_iter().chain([0.0]));
+    let place = |i: u32| [i % edge, i / edge % edge, i / (edge * edge)].map(|v| v as f32 + 0.3);
+    let numbers = (0..edge.pow(3)).flat_map(|i| place(i).into_iter().chain([0.0]));
     let bytes: Vec<u8> = numbers.flat_map(f32::to_le_bytes).collect();
     std::fs::write(&points, bytes).unwrap();
     let cubes = ["--lattice", "cubic", "--cell-size", "1"];
     json(&[&["quantize", &points, "--map-out", &map], &cubes[..]].concat());
+    u64::from(edge.pow(3))
+}
+
+#[test]
+fn a_mapper_of_two_million_voxels_ends_in_time_with_its_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let cells = grid_map(folder.path(), 128);
     let domain = LoopbackDomain::take().unwrap();
     let report = path("report");
     let params = [
