@@ -24,7 +24,7 @@ const SMALL: &str = "<CycloneDDS><Domain id=\"any\"><Internal><MaxSampleSize>300
 #[test]
 fn chunks_that_are_too_large_for_the_transport_are_counted_each() {
     let folder = tempfile::tempdir().unwrap();
-    let cells = grid_map(folder.path(), 41);
+    let cells = grid_map(folder.path(), 38);
     let domain = LoopbackDomain::take().unwrap();
     let network = Network {
         domain_id: domain.id(),
