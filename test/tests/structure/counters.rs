@@ -10,7 +10,7 @@ use super::source::{code, files};
 const PAGE: &str = "docs/counters.md";
 
 /// Numbers in reports and diagnostics that count nothing: sizes, states, rates, and a place in a log.
-const STATES: &str = "address begin_ns camera_info clients clouds_waiting depth end_ns evidence images_waiting latest_ms map_bytes mesh mesh_bytes \
+const STATES: &str = "address begin_ns camera_info clients clouds_waiting depth end_ns evidence images_waiting latest_ms map_bytes map_checksum mesh mesh_bytes \
     now_ns onnx origin paused rate submap voxels";
 
 /// Functions that give the reasons by which nodes count what they refuse.
