@@ -6,8 +6,9 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
-use crossbeam_channel::{Sender, bounded};
+use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
 
 use lattice_runtime::Shutdown;
 use lattice_runtime::run_catching_panics;
@@ -102,6 +103,20 @@ impl<E: Send + 'static> Compute<E> {
     /// Event sender; clones share the inbox.
     pub fn inbox(&self) -> Inbox<E> {
         self.inbox.clone()
+    }
+
+    /// As [`Compute::finish_with`], and calls `hurry` if that takes longer than `patience`.
+    pub fn finish_within(self, last: E, patience: Duration, hurry: impl FnOnce() + Send) {
+        let (done, ended) = bounded::<()>(0);
+        thread::scope(|scope| {
+            scope.spawn(move || {
+                if ended.recv_timeout(patience) == Err(RecvTimeoutError::Timeout) {
+                    hurry();
+                }
+            });
+            self.finish_with(last);
+            drop(done);
+        });
     }
 
     /// Processes the queued events and a last one, then ends the thread.

@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
+use crate::start::LAST_FLUSH;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Empty;
 use lattice_runtime::qos::Qos;
@@ -112,10 +113,12 @@ impl MapOutput {
         self.pending.len()
     }
 
-    /// Waits until both topics are sent.
+    /// Waits until both topics are sent, at most [`LAST_FLUSH`].
     pub fn flush(&self) {
-        self.map.flush(Duration::from_secs(2));
-        self.updates.flush(Duration::from_secs(2));
+        let begin = Instant::now();
+        self.map.flush(LAST_FLUSH);
+        let left = LAST_FLUSH.saturating_sub(begin.elapsed());
+        self.updates.flush(left);
     }
 
     /// Updates not published.

@@ -2,9 +2,13 @@
 
 use std::any::Any;
 use std::error::Error;
+use std::time::Duration;
 
 use lattice_runtime::Runtime;
 use lattice_runtime::params::{ParamError, Params};
+
+/// Longest wait of an ending node for the acknowledgements of its last messages: a process ends within 2 s of a signal.
+pub const LAST_FLUSH: Duration = Duration::from_millis(500);
 
 /// Error of starting a node.
 pub type NodeError = Box<dyn Error + Send + Sync>;

@@ -22,7 +22,7 @@ const MAX_TOLD: usize = 100;
 pub struct Recovered {
     /// Messages in the new bag.
     pub messages: u64,
-    /// Messages among them with a wrong checksum (MCAP), which may be altered.
+    /// Messages among them with a wrong checksum (MCAP), or without one in a damaged compressed file, which may be altered.
     pub unchecked: Vec<Unchecked>,
     /// Number of messages in the damaged bag by `metadata.yaml` or an index, if readable.
     pub claimed: Option<u64>,
@@ -61,8 +61,8 @@ impl Recovered {
 
 /// Writes the readable part of a bag to a new one at `out`, which must not exist.
 ///
-/// Rows of SQLite files are read individually after a damage. From MCAP chunks with a wrong checksum,
-/// uncompressed messages are recovered individually. Without any message no bag is created.
+/// Rows of SQLite files are read individually after a damage, and so are messages of MCAP chunks with a wrong checksum.
+/// Of compressed chunks and files the part before the damage is read. Without any message no bag is created.
 pub fn recover(bag: &Path, out: &Path) -> Result<Recovered, BagError> {
     let mut recovered = Recovered::default();
     let readers = readers(bag, &mut recovered)?;

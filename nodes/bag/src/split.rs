@@ -28,8 +28,8 @@ impl OpenFile {
     }
 
     fn open_compressed(path: &Path) -> Result<OpenFile, BagError> {
-        let copy = decompress_file(path)?;
-        match identify(&copy)? {
+        let (copy, damage) = decompress_file(path)?;
+        let opened = identify(&copy).and_then(|kind| match kind {
             FileKind::Mcap => McapFile::open(&copy, Some(copy.clone())).map(OpenFile::Mcap),
             FileKind::Sqlite3 => SqliteFile::open(&copy, Some(copy.clone())).map(OpenFile::Sqlite),
             FileKind::Zstd => Err(BagError::unsupported(
@@ -37,7 +37,37 @@ impl OpenFile {
                 "a storage file compressed twice".into(),
                 "decompress it with `zstd -d`",
             )),
+        });
+        match damage {
+            None => opened,
+            // The part before the damage may be too short.
+            Some(damage) => opened
+                .map(|open| open.with_damage(damage.clone()))
+                .map_err(|_| damage),
         }
+    }
+
+    /// The sound part of a compressed file with its damage.
+    fn with_damage(mut self, damage: BagError) -> OpenFile {
+        let damage = match damage {
+            BagError::Truncated {
+                path,
+                size_bytes,
+                inside,
+                ..
+            } => BagError::Truncated {
+                path,
+                size_bytes,
+                inside,
+                readable_messages: self.info().message_count,
+            },
+            other => other,
+        };
+        match &mut self {
+            OpenFile::Mcap(file) => file.note_damage(damage),
+            OpenFile::Sqlite(file) => file.note_damage(damage),
+        }
+        self
     }
 
     pub(crate) fn info(&self) -> &StorageInfo {

@@ -8,12 +8,10 @@ use lattice_runtime::Node;
 
 use super::lockstep::Lockstep;
 use super::playback::{Playback, SLICE};
-use crate::start::NodeError;
+use crate::start::{LAST_FLUSH, NodeError};
 
 /// Flush timeout at the end.
 const FLUSH_TIME: Duration = Duration::from_secs(20);
-/// Flush timeout after a signal.
-const HURRIED_FLUSH_TIME: Duration = Duration::from_secs(2);
 
 impl Playback {
     /// Waits until each of these topics has a subscriber, or until the timeout.
@@ -84,7 +82,7 @@ impl Playback {
         let deadline = |hurried| {
             Instant::now()
                 + match hurried {
-                    true => HURRIED_FLUSH_TIME,
+                    true => LAST_FLUSH,
                     false => FLUSH_TIME,
                 }
         };

@@ -18,7 +18,7 @@ use super::{EnuOutput, EnuTransformer, TransformerOptions, TransformerReport, mo
 use crate::cloud_input::{CloudSubscriptions, Converted, SubscribedClouds, bytes_of};
 use crate::compute::{Compute, Inbox};
 use crate::report;
-use crate::start::{Finish, NodeError, handed_over, open_params};
+use crate::start::{Finish, LAST_FLUSH, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
@@ -345,7 +345,7 @@ impl ComputeState {
         for output in self.machine.finish() {
             self.publish(output);
         }
-        self.outputs.points.flush(Duration::from_secs(2));
+        self.outputs.points.flush(LAST_FLUSH);
         let report = self.report();
         let (clouds_in, clouds_out) = (report.counts.clouds_in, report.counts.clouds_out);
         let dropped = report.dropped();

@@ -22,7 +22,7 @@ use crate::compute::{Compute, Inbox};
 use crate::mesh::read_mesh_in;
 use crate::report;
 use crate::segmenter::{self, LoadedNetwork, NetworkEvent, NetworkView, Worker};
-use crate::start::{Finish, NodeError, handed_over, open_params};
+use crate::start::{Finish, LAST_FLUSH, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
@@ -363,7 +363,7 @@ impl ComputeState {
     }
 
     fn finish(&mut self) {
-        self.points.flush(Duration::from_secs(2));
+        self.points.flush(LAST_FLUSH);
         let report = self.report();
         let counts = &report.counts;
         let (labels_in, clouds_out) = (counts.labels_in, counts.clouds_out);

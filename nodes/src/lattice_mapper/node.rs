@@ -377,7 +377,7 @@ impl ComputeState {
         let (clouds, voxels) = (self.machine.counts().clouds_in, self.machine.cells().len());
         let points = self.machine.distortion().points;
         log::info!("{clouds} clouds, {points} points in {voxels} voxels");
-        // Only computed for a report: a keyframe of millions of voxels takes seconds.
+        // Only computed for a report: sorting tens of millions of keys takes a second.
         if self.report_file.is_empty() {
             return;
         }

@@ -1,10 +1,10 @@
 //! Report of a `lattice_mapper`.
 
 use lattice_core::voxels::Distortion;
-use lattice_msgs::cdr;
 use serde::{Deserialize, Serialize};
 
 use super::{CorrectionCounts, LatticeMapper, MapperCounts};
+use crate::convert::map;
 
 /// Report of a `lattice_mapper`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,15 +42,15 @@ pub struct MapperReport {
     pub rms_m: f64,
     /// Largest distance.
     pub max_distance_m: f64,
-    /// Bytes of a whole keyframe as CDR.
+    /// Bytes of the voxels in a keyframe: keys and payloads, without the headers of its chunks.
     pub map_bytes: usize,
-    /// CRC-32 of the voxel keys and payloads of that keyframe.
-    pub map_crc32: u32,
+    /// Checksum of the voxel keys, and of their counts and offsets if kept.
+    pub map_checksum: u64,
 }
 
 impl MapperReport {
-    /// Report of a mapper; creates one keyframe to count its bytes.
-    pub fn of(mapper: &mut LatticeMapper) -> Self {
+    /// Report of a mapper, without a keyframe.
+    pub fn of(mapper: &LatticeMapper) -> Self {
         let Distortion {
             points,
             mse_per_dimension_m2,
@@ -59,19 +59,12 @@ impl MapperReport {
             max_distance_m,
         } = mapper.distortion();
         let counts = mapper.counts().clone();
-        let mut crc = crc32fast::Hasher::new();
-        let mut map_bytes = 0;
-        for chunk in mapper.keyframe() {
-            map_bytes += cdr::to_vec(&chunk).map_or(0, |bytes| bytes.len());
-            crc.update(&chunk.keys);
-            for count in &chunk.counts {
-                crc.update(&count.to_le_bytes());
-            }
-            for offset in &chunk.mean_offsets {
-                crc.update(&offset.to_le_bytes());
-            }
-        }
         let cells = mapper.cells();
+        let keys = cells.sorted_keys();
+        let (list, map_checksum) = match &mapper.occupancy {
+            Some(_) => (None, map::changes_sum(&[], &keys)),
+            None => (Some(mapper.list()), mapper.list().checksum()),
+        };
         let lattice = cells.lattice();
         Self {
             lattice: lattice.kind().name().to_owned(),
@@ -89,8 +82,67 @@ impl MapperReport {
             mean_distance_m,
             rms_m,
             max_distance_m,
-            map_bytes,
-            map_crc32: crc.finalize(),
+            map_bytes: map::voxel_bytes(&keys, list),
+            map_checksum,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lattice_core::lattice::{Lattice, LatticeKind};
+    use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
+
+    use super::*;
+    use crate::convert::{cloud, geometry};
+    use crate::lattice_mapper::{MapPayload, MapperOptions};
+
+    const MANY: u32 = 200_000;
+
+    /// Points 1 m apart.
+    fn points(count: u32) -> PointCloud2 {
+        let place = |i: u32| [i % 64, i / 64 % 64, i / 4096].map(|v| v as f32 + 0.3);
+        let data: Vec<u8> = (0..count)
+            .flat_map(|i| place(i).into_iter().flat_map(f32::to_le_bytes))
+            .collect();
+        let fields = cloud::xyz_fields(PointField::FLOAT32, 4);
+        let header = geometry::header("map", 1);
+        cloud::dense_cloud(header, fields, 12, count as usize, data)
+    }
+
+    fn mapper(payload: MapPayload, count: u32) -> LatticeMapper {
+        let lattice = Lattice::new(LatticeKind::Cubic, 1.0).unwrap();
+        let mut options = MapperOptions::new(lattice);
+        options.payload = payload;
+        let mut mapper = LatticeMapper::new(options, 1).unwrap();
+        mapper.on_cloud(&points(count)).unwrap();
+        mapper
+    }
+
+    #[test]
+    fn bytes_are_those_of_a_keyframe_that_is_not_made() {
+        for payload in [MapPayload::default(), MapPayload::Occupancy] {
+            let mut mapper = mapper(payload, MANY);
+            let report = MapperReport::of(&mapper);
+            assert_eq!((report.counts.keyframes, report.voxels), (0, MANY as usize));
+            let chunks = mapper.keyframe();
+            let bytes = chunks.iter().map(|chunk| {
+                chunk.keys.len() + 4 * chunk.counts.len() + 2 * chunk.mean_offsets.len()
+            });
+            let bytes: usize = bytes.sum();
+            // Each chunk begins with a whole key.
+            let most = report.map_bytes + 10 * chunks.len();
+            assert!((report.map_bytes..=most).contains(&bytes), "{payload:?}");
+            assert!(chunks.len() > 1);
+        }
+    }
+
+    #[test]
+    fn the_checksum_is_that_of_the_map() {
+        for payload in [MapPayload::default(), MapPayload::Occupancy] {
+            let checksum = |count| MapperReport::of(&mapper(payload, count)).map_checksum;
+            assert_eq!(checksum(5000), checksum(5000), "{payload:?}");
+            assert_ne!(checksum(5000), checksum(4999), "{payload:?}");
         }
     }
 }

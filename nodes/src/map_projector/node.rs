@@ -14,7 +14,7 @@ use super::{MapProjector, MapProjectorOptions, Projected, ProjectorReport};
 use crate::compute::{Compute, Inbox};
 use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
-use crate::start::{Finish, NodeError, handed_over, open_params};
+use crate::start::{Finish, LAST_FLUSH, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
@@ -24,8 +24,6 @@ use lattice_runtime::{
 
 /// Time without a subscriber after which the map is no longer followed.
 const IDLE: Duration = Duration::from_secs(10);
-/// Longest wait for readers at the end.
-const FLUSH: Duration = Duration::from_secs(1);
 
 /// Event for the compute thread.
 enum Event {
@@ -323,8 +321,10 @@ impl ComputeState {
 
     fn finish(&mut self) {
         self.project();
-        self.outputs.grid.flush(FLUSH);
-        self.outputs.updates.flush(FLUSH);
+        let begin = Instant::now();
+        self.outputs.grid.flush(LAST_FLUSH);
+        let left = LAST_FLUSH.saturating_sub(begin.elapsed());
+        self.outputs.updates.flush(left);
         self.inputs = None;
         if let Err(error) = report::write(&self.report_file, &self.report(), &self.diagnostics) {
             log::error!("{error}");

@@ -239,7 +239,7 @@ impl Branch {
         self.markers.wipe();
         self.report.marker_bytes = self.markers.take_bytes();
         LatticeReport {
-            map: MapperReport::of(&mut self.mapper),
+            map: MapperReport::of(&self.mapper),
             markers: self.report.clone(),
         }
     }

@@ -248,13 +248,13 @@ mod tests {
 
     fn report() -> RunReport {
         let lattice = Lattice::new(LatticeKind::Fcc, 0.125).unwrap();
-        let mut mapper = LatticeMapper::new(MapperOptions::new(lattice), 1).unwrap();
+        let mapper = LatticeMapper::new(MapperOptions::new(lattice), 1).unwrap();
         let mut report = RunReport {
             source: "log".into(),
             clouds_in_log: 10,
             transformer: TransformerReport::default(),
             lattices: vec![LatticeReport {
-                map: MapperReport::of(&mut mapper),
+                map: MapperReport::of(&mapper),
                 markers: MarkerReport::default(),
             }],
             origin: None,

@@ -28,7 +28,7 @@ mod worker;
 pub use colors::Normalisation;
 pub(crate) use inside::{LoadedNetwork, NetworkView, hand_over};
 pub use labels::{Labelled, Meaning};
-pub use network::{Backend, ModelError, Network, Scores, Size, Values};
+pub use network::{Backend, Interrupter, ModelError, Network, Scores, Size, Values};
 pub use options::SegmenterOptions;
 pub use parameters::declare;
 pub(crate) use parameters::{NETWORK, NetworkSettings};
@@ -37,6 +37,7 @@ pub(crate) use worker::{NetworkEvent, Worker};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use lattice_msgs::sensor_msgs::{CompressedImage, Image};
 use lattice_msgs::std_msgs::Header;
@@ -125,6 +126,7 @@ pub struct Segmenter {
     network: Box<dyn Network>,
     counts: SegmenterCounts,
     problem: Option<String>,
+    interrupted: Arc<AtomicBool>,
 }
 
 impl Segmenter {
@@ -135,7 +137,17 @@ impl Segmenter {
             network,
             counts: SegmenterCounts::default(),
             problem: None,
+            interrupted: Arc::default(),
         }
+    }
+
+    /// Function that ends the inference in progress: its image and later ones are skipped.
+    pub fn interrupter(&self) -> Interrupter {
+        let (interrupted, network) = (Arc::clone(&self.interrupted), self.network.interrupter());
+        Box::new(move || {
+            interrupted.store(true, Ordering::Relaxed);
+            network();
+        })
     }
 
     /// Changes the options.
@@ -169,7 +181,8 @@ impl Segmenter {
                 Some(labelled)
             }
             Err(problem) => {
-                self.refuse("network", problem);
+                let interrupted = self.interrupted.load(Ordering::Relaxed);
+                self.refuse(if interrupted { "skipped" } else { "network" }, problem);
                 None
             }
         }

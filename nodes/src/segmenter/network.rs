@@ -98,6 +98,9 @@ pub enum ModelError {
     },
 }
 
+/// Function that interrupts a network from another thread.
+pub type Interrupter = Box<dyn Fn() + Send + Sync>;
+
 /// A network that labels images.
 pub trait Network: Send {
     /// Input size.
@@ -110,4 +113,9 @@ pub trait Network: Send {
     ///
     /// Errors: inference fails, or the output differs from its declaration.
     fn run(&self, planes: Vec<f32>) -> Result<Scores, String>;
+
+    /// Function that ends the inference in progress, and all later ones, with an error.
+    fn interrupter(&self) -> Interrupter {
+        Box::new(|| ())
+    }
 }

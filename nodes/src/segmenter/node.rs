@@ -8,11 +8,11 @@ use lattice_msgs::vision_msgs::LabelInfo;
 
 use super::inside::{self, status_of};
 use super::parameters::Settings;
-use super::worker::{Input, Slot};
+use super::worker::{Input, MAX_LAST_INFERENCE, Slot};
 use super::{Segmenter, SegmenterOptions, SegmenterReport};
 use crate::compute::Compute;
 use crate::report;
-use crate::start::{Finish, NodeError, handed_over, open_params};
+use crate::start::{Finish, LAST_FLUSH, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Losses, Publisher, Runtime};
@@ -50,6 +50,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         report_file: settings.report_file,
     };
     compute_state.publish_names();
+    let interrupt = compute_state.machine.interrupter();
     let mut compute_state = compute_state;
     let shutdown = runtime.shutdown_handle();
     let compute = Compute::spawn(name, settings.limits, shutdown, move |event| {
@@ -75,7 +76,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     });
     Ok(Box::new(move || {
         drop((images, looks));
-        compute.finish_with(Event::Finish);
+        compute.finish_within(Event::Finish, MAX_LAST_INFERENCE, interrupt);
         Box::new(())
     }))
 }
@@ -172,7 +173,7 @@ impl ComputeState {
     }
 
     fn finish(&mut self) {
-        self.labels.flush(Duration::from_secs(2));
+        self.labels.flush(LAST_FLUSH);
         let report = self.report();
         let counts = &report.counts;
         let (images_in, labels_out, dropped) =

@@ -2,14 +2,14 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use ort::logging::LogLevel;
-use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
+use ort::session::{RunOptions, Session};
 use ort::value::{DynValue, TensorElementType, TensorRef};
 
-use super::network::{ModelError, Network, Scores, Size, Values};
+use super::network::{Interrupter, ModelError, Network, Scores, Size, Values};
 use super::{checks, file, sizes};
 
 /// Library name unless `ORT_DYLIB_PATH` is set.
@@ -18,6 +18,8 @@ const LIBRARY: &str = "libonnxruntime.so";
 /// Network of a file in an ONNX Runtime session.
 pub(super) struct OrtNetwork {
     session: Mutex<Session>,
+    /// Terminated by an interruption.
+    options: Arc<RunOptions>,
     input: Size,
     names: Vec<String>,
 }
@@ -58,12 +60,23 @@ impl Network for OrtNetwork {
         let run = AssertUnwindSafe(|| {
             let tensor =
                 TensorRef::from_array_view((shape, planes.as_slice())).map_err(in_words)?;
-            let outputs = session.run(ort::inputs![tensor]).map_err(in_words)?;
+            let outputs = session
+                .run_with_options(ort::inputs![tensor], &self.options)
+                .map_err(in_words)?;
             let output = outputs.values().next();
             let output = output.ok_or("the network has no output")?;
             scores_of(&output)
         });
         catch_unwind(run).unwrap_or_else(|_| Err("the network failed".to_owned()))
+    }
+
+    fn interrupter(&self) -> Interrupter {
+        let options = Arc::clone(&self.options);
+        Box::new(move || {
+            if let Err(error) = options.terminate() {
+                log::debug!("the network is not interrupted: {error}");
+            }
+        })
     }
 }
 
@@ -125,6 +138,7 @@ fn made_of(
     let input = input_of(&session, size)?;
     file::tried(OrtNetwork {
         session: Mutex::new(session),
+        options: Arc::new(RunOptions::new().map_err(in_words)?),
         input,
         names,
     })

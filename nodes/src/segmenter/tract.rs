@@ -9,13 +9,14 @@ mod taps;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use tract_linalg::multithread::Executor;
 use tract_onnx::prelude::*;
-use tract_onnx::tract_hir::tract_core::plan::SimplePlan;
+use tract_onnx::tract_hir::tract_core::plan::{self, SimplePlan};
 use tract_onnx::tract_hir::tract_core::runtime::RunOptions;
 
-use super::network::{ModelError, Network, Scores, Size, Values};
+use super::network::{Interrupter, ModelError, Network, Scores, Size, Values};
 use super::{checks, file, sizes};
 
 /// Network of a file, prepared for images of one size.
@@ -23,6 +24,7 @@ pub(super) struct OnnxNetwork {
     plan: Arc<TypedSimplePlan>,
     input: Size,
     names: Vec<String>,
+    interrupted: Arc<AtomicBool>,
 }
 
 impl OnnxNetwork {
@@ -59,13 +61,26 @@ impl Network for OnnxNetwork {
         let run = || -> TractResult<TVec<TValue>> {
             let shape = [1, 3, self.input.height, self.input.width];
             let tensor = Tensor::from_shape(&shape, &planes)?;
-            self.plan.run(tvec!(tensor.into()))
+            let mut state = self.plan.spawn()?;
+            // Between operators.
+            state.run_plan_with_eval(
+                tvec!(tensor.into()),
+                |context, state, node, inputs| match self.interrupted.load(Ordering::Relaxed) {
+                    true => Err(TractError::msg("interrupted")),
+                    false => plan::eval(context, state, node, inputs),
+                },
+            )
         };
         let outputs = catch_unwind(AssertUnwindSafe(run))
             .map_err(|_| "the network failed".to_owned())?
             .map_err(|error| first_line(&error))?;
         let output = outputs.first().ok_or("the network has no output")?;
         scores_of(output)
+    }
+
+    fn interrupter(&self) -> Interrupter {
+        let interrupted = Arc::clone(&self.interrupted);
+        Box::new(move || interrupted.store(true, Ordering::Relaxed))
     }
 }
 
@@ -97,7 +112,12 @@ fn made_of(
         ..RunOptions::default()
     };
     let plan = SimplePlan::new_with_options(model, &options).map_err(in_words)?;
-    file::tried(OnnxNetwork { plan, input, names })
+    file::tried(OnnxNetwork {
+        plan,
+        input,
+        names,
+        interrupted: Arc::default(),
+    })
 }
 
 /// Output as scores (1 x classes x rows x columns) or classes (1 x rows x columns, optionally with another 1).

@@ -3,15 +3,19 @@
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use lattice_msgs::sensor_msgs::{CompressedImage, Image};
 use lattice_msgs::vision_msgs::LabelInfo;
 
+use super::network::Interrupter;
 use super::{Labelled, Segmenter, SegmenterCounts, SegmenterOptions};
 use crate::camera::LabelSet;
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use lattice_runtime::Shutdown;
+
+/// Longest inference after the request to end; then it is interrupted.
+pub(super) const MAX_LAST_INFERENCE: Duration = Duration::from_millis(500);
 
 /// Received image.
 pub(crate) enum Input {
@@ -110,6 +114,7 @@ impl WorkerState {
 pub(crate) struct Worker {
     compute: Compute<Event>,
     slot: Arc<Slot>,
+    interrupt: Interrupter,
 }
 
 impl Worker {
@@ -122,6 +127,7 @@ impl Worker {
         tell: impl FnMut(NetworkEvent) + Send + 'static,
     ) -> io::Result<Self> {
         let slot = Arc::new(Slot::default());
+        let interrupt = segmenter.interrupter();
         let mut job = Job {
             segmenter,
             slot: Arc::clone(&slot),
@@ -137,7 +143,11 @@ impl Worker {
         };
         let name = format!("{name} network");
         let compute = Compute::spawn(&name, limits, shutdown, move |event| job.on(event))?;
-        Ok(Self { compute, slot })
+        Ok(Self {
+            compute,
+            slot,
+            interrupt,
+        })
     }
 
     /// Handler that stores images and returns at once.
@@ -157,9 +167,10 @@ impl Worker {
         move |options| inbox.send(Event::Settings(Box::new(options)), 0)
     }
 
-    /// Labels the waiting image, and ends the thread.
+    /// Labels the waiting image if the network is fast enough, and ends the thread.
     pub fn finish(self) {
-        self.compute.finish_with(Event::Finish);
+        self.compute
+            .finish_within(Event::Finish, MAX_LAST_INFERENCE, self.interrupt);
     }
 }
 
@@ -217,5 +228,86 @@ impl<T: FnMut(NetworkEvent)> Job<T> {
     fn show(&self) {
         let state = WorkerState::new(&self.segmenter, self.last_s);
         *self.state.lock().unwrap_or_else(PoisonError::into_inner) = state;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+    use std::sync::mpsc::{Sender, channel};
+
+    use super::*;
+    use crate::segmenter::{Network, Scores, Size};
+
+    /// A network that ends by an interruption only.
+    struct Endless {
+        began: Sender<()>,
+        interrupted: Arc<AtomicBool>,
+    }
+
+    impl Network for Endless {
+        fn input(&self) -> Size {
+            Size {
+                width: 1,
+                height: 1,
+            }
+        }
+
+        fn names(&self) -> &[String] {
+            &[]
+        }
+
+        fn run(&self, _: Vec<f32>) -> Result<Scores, String> {
+            self.began.send(()).unwrap();
+            while !self.interrupted.load(Ordering::Relaxed) {
+                std::thread::yield_now();
+            }
+            Err("interrupted".to_owned())
+        }
+
+        fn interrupter(&self) -> Interrupter {
+            let interrupted = Arc::clone(&self.interrupted);
+            Box::new(move || interrupted.store(true, Ordering::Relaxed))
+        }
+    }
+
+    #[test]
+    fn a_busy_network_is_interrupted_at_the_end() {
+        let (began, begun) = channel();
+        let network = Endless {
+            began,
+            interrupted: Arc::default(),
+        };
+        let segmenter = Segmenter::new(SegmenterOptions::default(), Box::new(network));
+        let state = Arc::new(Mutex::new(WorkerState::new(&segmenter, 0.0)));
+        let (shown, shutdown) = (Arc::clone(&state), Shutdown::default());
+        let worker = Worker::spawn("test", segmenter, state, shutdown, |_| ()).unwrap();
+        let image = Arc::new(Image {
+            height: 1,
+            width: 1,
+            encoding: "rgb8".to_owned(),
+            step: 3,
+            data: vec![1, 2, 3].into(),
+            ..Image::default()
+        });
+        let mut put = worker.image_callback();
+        put(Input::Plain(Arc::clone(&image)));
+        begun.recv().unwrap();
+        // It waits while the network runs.
+        put(Input::Plain(image));
+        let begin = Instant::now();
+        worker.finish();
+        assert!(begin.elapsed() >= MAX_LAST_INFERENCE);
+        assert_eq!(
+            begun.try_iter().count(),
+            1,
+            "the waiting image fails at once"
+        );
+        let counts = shown.lock().unwrap().counts.clone();
+        assert_eq!((counts.images_in, counts.labels_out), (2, 0));
+        assert_eq!(
+            counts.dropped.into_iter().collect::<Vec<_>>(),
+            [("skipped".to_owned(), 2)]
+        );
     }
 }

@@ -14,7 +14,7 @@ use super::{CloudOptions, CloudOutput, CloudReport, SemanticCloud, Stream};
 use crate::compute::{Compute, Inbox};
 use crate::report;
 use crate::segmenter::{self, LoadedNetwork, NetworkEvent, Worker};
-use crate::start::{Finish, NodeError, handed_over, open_params};
+use crate::start::{Finish, LAST_FLUSH, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
@@ -360,7 +360,7 @@ impl ComputeState {
     }
 
     fn finish(&mut self) {
-        self.points.flush(Duration::from_secs(2));
+        self.points.flush(LAST_FLUSH);
         let report = self.report();
         let counts = &report.counts;
         let (depth_in, clouds_out, dropped) = (counts.depth_in, counts.clouds_out, &counts.dropped);

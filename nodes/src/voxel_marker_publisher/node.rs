@@ -11,13 +11,10 @@ use super::{MarkerOptions, MarkerReport, VoxelMarkers};
 use crate::compute::Compute;
 use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
-use crate::start::{Finish, NodeError, handed_over, open_params};
+use crate::start::{Finish, LAST_FLUSH, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Level, Publisher, Runtime, Undecoded};
-
-/// Longest wait for readers at the end.
-const FLUSH: Duration = Duration::from_secs(1);
 
 /// Acknowledgement delay that triggers a warning: two heartbeats of Fast DDS, the
 /// slowest to repair.
@@ -179,8 +176,10 @@ impl ComputeState {
         // Several budgets in sequence, as fast as viewers acknowledge, for a limited time.
         let begin = Instant::now();
         self.draw();
-        while self.markers.flush(FLUSH.saturating_sub(begin.elapsed()))
-            && begin.elapsed() < FLUSH
+        while self
+            .markers
+            .flush(LAST_FLUSH.saturating_sub(begin.elapsed()))
+            && begin.elapsed() < LAST_FLUSH
             && self.markers.subscriber_count() > 0
             && self.machine.is_dirty()
         {
@@ -190,7 +189,7 @@ impl ComputeState {
         if blocks_not_drawn > 0 && self.markers.subscriber_count() > 0 {
             log::warn!(
                 "{}: {blocks_not_drawn} changed blocks are not sent: subscribers have not acknowledged the others within \
-                 {FLUSH:?}",
+                 {LAST_FLUSH:?}",
                 self.markers.topic()
             );
         }

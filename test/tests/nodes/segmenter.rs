@@ -107,6 +107,8 @@ fn networks_give_what_onnx_runtime_gives() {
             );
             assert!(difference < 1e-4, "{name}: {difference}");
             assert!(differ * 1000 <= size.pixels(), "{name}: {differ}");
+            network.interrupter()();
+            assert!(network.run(image.clone()).is_err(), "{name}, {backend}");
         }
     }
     let psp = read_network(&path.join("psp.onnx"), None, 1).unwrap();

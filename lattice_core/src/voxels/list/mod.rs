@@ -1,6 +1,7 @@
 //! Voxel list: construction, lookup, invariants; each kind of change has its own file.
 
 mod changes;
+mod checksum;
 mod exposed_faces;
 mod fill;
 mod insert;

@@ -29,7 +29,8 @@ pub(super) struct Block {
     pub channels: Option<Box<[u16]>>,
     /// True after a damage.
     pub behind: bool,
-    /// True for messages recovered individually from a chunk with a wrong checksum.
+    /// True for messages recovered individually from a chunk with a wrong checksum, and for such a chunk if it is
+    /// compressed: its damage is known.
     pub unchecked: bool,
 }
 

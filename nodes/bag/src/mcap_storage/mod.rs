@@ -2,6 +2,7 @@
 
 mod contents;
 mod lengths;
+mod packed;
 mod records;
 mod resume;
 mod salvage;
@@ -36,6 +37,8 @@ pub(crate) struct McapFile {
     blocks: Vec<Block>,
     topic_of: Arc<BTreeMap<u16, usize>>,
     damages: Vec<BagError>,
+    /// True if messages outside of chunks, which have no checksum, may be altered.
+    unchecked: bool,
     /// Number of messages by the summary, if readable.
     pub(crate) claimed: Option<u64>,
     pub(crate) info: StorageInfo,
@@ -86,9 +89,20 @@ impl McapFile {
             blocks: contents.blocks,
             topic_of: Arc::new(topic_of),
             damages: contents.damages,
+            unchecked: false,
             claimed,
             info,
         })
+    }
+
+    /// Notes the damage of the compressed file of which this is the sound part.
+    pub(crate) fn note_damage(&mut self, damage: BagError) {
+        // The part has no end.
+        self.damages
+            .retain(|damage| !matches!(damage, BagError::Truncated { .. }));
+        self.damages.push(damage);
+        self.info.damage = self.damages.first().cloned();
+        self.unchecked = true;
     }
 
     /// Selected messages in order of log time.

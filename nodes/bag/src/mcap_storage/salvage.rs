@@ -28,19 +28,19 @@ const MAX_REPRESENTATION: u8 = 0x0b;
 /// Target size of blocks of consecutive messages, bytes.
 const RUN_BYTES: u64 = 1 << 20;
 
-/// Random access to the bytes of a file through a buffered window.
-struct Window<'a> {
-    file: &'a mut File,
+/// Random access to bytes through a buffered window.
+struct Window<'a, R> {
+    source: &'a mut R,
     bytes: Vec<u8>,
     start: u64,
-    /// End of the part, bytes from the start of the file.
+    /// End of the part, bytes from the start of the source.
     end: u64,
 }
 
-impl<'a> Window<'a> {
-    fn new(file: &'a mut File, end: u64) -> Window<'a> {
+impl<'a, R: Read + Seek> Window<'a, R> {
+    fn new(source: &'a mut R, end: u64) -> Window<'a, R> {
         Window {
-            file,
+            source,
             bytes: Vec::new(),
             start: 0,
             end,
@@ -51,17 +51,18 @@ impl<'a> Window<'a> {
     fn at(&mut self, at: u64, count: usize) -> io::Result<&[u8]> {
         let left = self.end.saturating_sub(at);
         let count = count.min(usize::try_from(left).unwrap_or(usize::MAX));
-        let has = |window: &Window<'_>| {
+        let has = |window: &Window<'_, R>| {
             let from = usize::try_from(at.checked_sub(window.start)?).ok()?;
             let to = from.checked_add(count)?;
             (to <= window.bytes.len()).then_some(from..to)
         };
         if has(self).is_none() {
-            self.file.seek(SeekFrom::Start(at))?;
+            self.source.seek(SeekFrom::Start(at))?;
             self.bytes.clear();
             self.start = at;
             let most = WINDOW_BYTES.max(count as u64).min(left);
-            self.file.by_ref().take(most).read_to_end(&mut self.bytes)?;
+            let mut part = self.source.by_ref().take(most);
+            part.read_to_end(&mut self.bytes)?;
         }
         let found = has(self).and_then(|range| self.bytes.get(range));
         Ok(found.unwrap_or_default())
@@ -111,13 +112,13 @@ fn message_head<V>(head: &[u8], left: u64, bounds: &MessageBounds<'_, V>) -> Opt
     is_message.then_some(found)
 }
 
-/// Recovers schemas and channels between two bytes of the file, if they parse without contradiction.
+/// Recovers schemas and channels between two bytes of a file, if they parse without contradiction.
 pub(super) fn definitions(
-    file: &mut File,
+    source: &mut (impl Read + Seek),
     (start, end): (u64, u64),
     contents: &mut Contents,
 ) -> io::Result<()> {
-    let mut window = Window::new(file, end);
+    let mut window = Window::new(source, end);
     let mut at = start;
     while at < end {
         let left = end - at;
@@ -160,8 +161,24 @@ pub(super) fn messages<V>(
     (start, end): (u64, u64),
     channels: &BTreeMap<u16, V>,
 ) -> io::Result<Vec<Block>> {
-    let mut window = Window::new(file, end);
-    let span = chunk_span(window.at(start, CHUNK_SPAN_BYTES)?);
+    let span = span_at(file, start)?;
+    messages_within(file, (start, end), span, channels)
+}
+
+/// Span of the log times of the chunk at a byte of the file.
+pub(super) fn span_at(file: &mut File, start: u64) -> io::Result<Option<(u64, u64)>> {
+    let mut window = Window::new(file, start.saturating_add(CHUNK_SPAN_BYTES as u64));
+    Ok(chunk_span(window.at(start, CHUNK_SPAN_BYTES)?))
+}
+
+/// Blocks of messages between two bytes of a source, such as the content of a chunk with a known span of log times.
+pub(super) fn messages_within<V>(
+    source: &mut (impl Read + Seek),
+    (start, end): (u64, u64),
+    span: Option<(u64, u64)>,
+    channels: &BTreeMap<u16, V>,
+) -> io::Result<Vec<Block>> {
+    let mut window = Window::new(source, end);
     let of = |span| MessageBounds { channels, span };
     let found = runs(&mut window, start, &of(span.unwrap_or(ALL_TIMES)))?;
     match span {
@@ -184,7 +201,7 @@ struct MessageBounds<'a, V> {
 }
 
 fn runs<V>(
-    window: &mut Window<'_>,
+    window: &mut Window<'_, impl Read + Seek>,
     start: u64,
     bounds: &MessageBounds<'_, V>,
 ) -> io::Result<Vec<Block>> {
@@ -214,7 +231,7 @@ fn runs<V>(
 }
 
 fn next_message<V>(
-    window: &mut Window<'_>,
+    window: &mut Window<'_, impl Read + Seek>,
     from: u64,
     bounds: &MessageBounds<'_, V>,
 ) -> io::Result<Option<(u64, Head)>> {

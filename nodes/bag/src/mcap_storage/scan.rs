@@ -3,7 +3,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs::File,
-    io::{Seek, SeekFrom},
+    io::{self, Cursor, Seek, SeekFrom},
     ops::ControlFlow,
     path::Path,
 };
@@ -12,9 +12,10 @@ use mcap::{records::op, sans_io::LinearReaderOptions};
 
 use super::{
     contents::{Block, Contents, Seen},
+    packed::unpack,
     records::{Place, RECORD_HEADER_BYTES, RecordError, parse_message, visit_chunk, visit_records},
     resume::next_chunk,
-    salvage::{definitions, messages},
+    salvage::{definitions, messages, messages_within, span_at},
 };
 use crate::{BagError, sniff::MCAP_MAGIC};
 
@@ -72,8 +73,12 @@ impl Scan {
                 false => next_chunk(file, damaged.saturating_add(1), size).unwrap_or_default(),
             };
             let stretch = (damaged, chunk.unwrap_or(size));
-            let salvaged = definitions(file, stretch, &mut self.contents)
-                .and_then(|()| messages(file, stretch, &self.contents.channels));
+            let salvaged = match unpack(file, stretch) {
+                Ok(Some(content)) => self.packed(file, stretch, &content),
+                Ok(None) => definitions(file, stretch, &mut self.contents)
+                    .and_then(|()| messages(file, stretch, &self.contents.channels)),
+                Err(error) => Err(error),
+            };
             match salvaged {
                 Ok(blocks) => self.contents.blocks.extend(blocks),
                 Err(error) => log::warn!("{}: {error}", path.display()),
@@ -86,6 +91,32 @@ impl Scan {
         if let Err(error) = found {
             log::warn!("{}: {error}", path.display());
         }
+    }
+
+    /// Adds the definitions of a damaged compressed chunk; the chunk as one block, if it has messages.
+    fn packed(
+        &mut self,
+        file: &mut File,
+        (start, end): (u64, u64),
+        content: &[u8],
+    ) -> io::Result<Vec<Block>> {
+        let (mut content, part) = (Cursor::new(content), (0, content.len() as u64));
+        definitions(&mut content, part, &mut self.contents)?;
+        let span = span_at(file, start)?;
+        let found = messages_within(&mut content, part, span, &self.contents.channels)?;
+        let first_ns = found.iter().map(|block| block.start_ns).min();
+        let last_ns = found.iter().map(|block| block.end_ns).max();
+        let chunk = first_ns.zip(last_ns).map(|(start_ns, end_ns)| Block {
+            offset: start,
+            len: end.saturating_sub(start),
+            opcode: op::CHUNK,
+            start_ns,
+            end_ns,
+            channels: None,
+            behind: true,
+            unchecked: true,
+        });
+        Ok(chunk.into_iter().collect())
     }
 
     /// Takes the records from byte `start` on; breaks at the end of the data section.

@@ -4,7 +4,7 @@ use std::{
     cmp::Reverse,
     collections::{BTreeMap, BinaryHeap, VecDeque},
     fs::File,
-    io::{Seek, SeekFrom},
+    io::{self, Cursor, Read, Seek, SeekFrom},
     ops::ControlFlow,
     path::PathBuf,
     sync::Arc,
@@ -16,6 +16,7 @@ use tempfile::TempPath;
 use super::{
     McapFile,
     contents::Block,
+    packed::unpack,
     records::{Cause, Place, RecordError, parse_message, visit_chunk, visit_records},
     salvage,
 };
@@ -40,6 +41,8 @@ pub(super) struct McapStream {
     waiting: BinaryHeap<Reverse<Waiting>>,
     waiting_bytes: u64,
     damages: VecDeque<BagError>,
+    /// True if messages outside of chunks may be altered.
+    unchecked: bool,
 }
 
 /// A buffered message, ordered by time, then by position in the file.
@@ -89,6 +92,7 @@ impl McapStream {
             waiting: BinaryHeap::new(),
             waiting_bytes: 0,
             damages,
+            unchecked: file.unchecked,
         })
     }
 
@@ -105,31 +109,55 @@ impl McapStream {
 
     /// Replaces a damaged chunk by its recovered messages.
     fn salvage(&mut self, chunk: &Block) {
-        let stretch = (chunk.offset, chunk.offset.saturating_add(chunk.len));
-        match salvage::messages(&mut self.file, stretch, &self.topic_of) {
-            Ok(blocks) => blocks
-                .into_iter()
-                .rev()
-                .for_each(|block| self.blocks.push_front(block)),
-            Err(error) => log::warn!("{}: {error}", self.path.display()),
+        if let Err(error) = self.try_salvage(chunk) {
+            log::warn!("{}: {error}", self.path.display());
         }
     }
 
-    fn read_block(&mut self, block: &Block) -> Result<(), RecordError> {
+    fn try_salvage(&mut self, chunk: &Block) -> io::Result<()> {
+        let stretch = (chunk.offset, chunk.offset.saturating_add(chunk.len));
+        let Some(content) = unpack(&mut self.file, stretch)? else {
+            let blocks = salvage::messages(&mut self.file, stretch, &self.topic_of)?;
+            let blocks = blocks.into_iter().rev();
+            blocks.for_each(|block| self.blocks.push_front(block));
+            return Ok(());
+        };
+        let span = salvage::span_at(&mut self.file, chunk.offset)?;
+        let (mut source, part) = (Cursor::new(&content), (0, content.len() as u64));
+        for block in salvage::messages_within(&mut source, part, span, &self.topic_of)? {
+            if let Err(error) = self.read_block(&block, Some(&content)) {
+                log::debug!("{:?}", error.in_file(&self.path, 0, 0));
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads the messages of a block of the file, or of the content of a damaged chunk.
+    fn read_block(&mut self, block: &Block, content: Option<&[u8]>) -> Result<(), RecordError> {
         let number = self.blocks_read;
         self.blocks_read += 1;
         let start = Place::in_file(block.offset);
-        self.file
-            .seek(SeekFrom::Start(block.offset))
-            .map_err(|error| RecordError::bad(start, error))?;
+        let mut file = &self.file;
+        let mut part = content.map(|content| {
+            let from = usize::try_from(block.offset).unwrap_or(usize::MAX);
+            content.get(from..).unwrap_or_default()
+        });
+        let source: &mut dyn Read = match &mut part {
+            Some(part) => part,
+            None => {
+                file.seek(SeekFrom::Start(block.offset))
+                    .map_err(|error| RecordError::bad(start, error))?;
+                &mut file
+            }
+        };
+        let unchecked = block.unchecked || self.unchecked && block.opcode == op::MESSAGE;
         let (filter, topic_of) = (&self.filter, &self.topic_of);
         // A chunk counts only with a valid CRC.
         let mut read = Vec::new();
         let mut waiting_bytes = self.waiting_bytes;
         let mut take = |place, opcode, body: &[u8]| {
             if opcode == op::MESSAGE
-                && let Some(message) =
-                    wanted(place, body, topic_of, filter, (number, block.unchecked))?
+                && let Some(message) = wanted(place, body, topic_of, filter, (number, unchecked))?
             {
                 waiting_bytes = waiting_bytes.saturating_add(message.bytes());
                 if waiting_bytes > MAX_WAITING_BYTES {
@@ -146,7 +174,7 @@ impl McapStream {
         };
         let options = LinearReaderOptions::default().with_skip_end_magic(true);
         let range = (block.offset, block.len);
-        let _ = visit_records(&self.file, range, options, &mut |place, opcode, body| {
+        let _ = visit_records(source, range, options, &mut |place, opcode, body| {
             if place.byte == block.offset && opcode != block.opcode {
                 let reason = format!("opcode {opcode}, where the index has {}", block.opcode);
                 return Err(RecordError::bad(place, reason));
@@ -200,7 +228,11 @@ impl Iterator for McapStream {
     fn next(&mut self) -> Option<Self::Item> {
         while self.needs_block() {
             let block = self.blocks.pop_front()?;
-            if let Err(error) = self.read_block(&block) {
+            if block.unchecked && block.opcode == op::CHUNK {
+                self.salvage(&block);
+                continue;
+            }
+            if let Err(error) = self.read_block(&block, None) {
                 let is_full = matches!(error.cause, Cause::TooLarge { .. });
                 let error = error.in_file(&self.path, 0, 0);
                 if self.filter.past_damage {

@@ -40,6 +40,8 @@ pub(crate) struct SqliteFile {
     /// True for a truncated file.
     cut: bool,
     salvaged: OnceLock<Arc<Salvaged>>,
+    /// True if rows, which have no checksum, may be altered.
+    unchecked: bool,
     pub(crate) info: StorageInfo,
 }
 
@@ -72,6 +74,7 @@ impl SqliteFile {
             time_index: None,
             cut: missing_pages.is_some(),
             salvaged: OnceLock::new(),
+            unchecked: false,
             info: StorageInfo::default(),
         };
         let cut = |error: BagError| missing_pages.clone().unwrap_or(error);
@@ -87,6 +90,12 @@ impl SqliteFile {
             (Some(damage), _) => file.rescue(&connection, damage),
         }
         Ok(file)
+    }
+
+    /// Notes the damage of the compressed file of which this is the sound part.
+    pub(crate) fn note_damage(&mut self, damage: BagError) {
+        self.info.damage = Some(damage);
+        self.unchecked = true;
     }
 
     /// Selected messages in order of log time.

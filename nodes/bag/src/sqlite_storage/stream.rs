@@ -69,6 +69,7 @@ pub(super) struct SqliteStream {
     page_keys: usize,
     messages_read: u64,
     damages: VecDeque<BagError>,
+    unchecked: bool,
 }
 
 impl SqliteStream {
@@ -89,6 +90,7 @@ impl SqliteStream {
             },
             messages_read: 0,
             damages: file.info.damage.iter().cloned().collect(),
+            unchecked: file.unchecked,
         };
         let salvaged = past_damage.then(|| file.salvaged(&stream.connection));
         if let Some(salvaged) = &salvaged {
@@ -172,7 +174,7 @@ impl SqliteStream {
         Ok(StorageMessage {
             topic,
             log_time_ns: key.timestamp_ns,
-            unchecked: false,
+            unchecked: self.unchecked,
             data,
         })
     }

@@ -3,6 +3,7 @@
 mod damage;
 mod foreign;
 mod recover;
+mod recover_packed;
 mod wrong_metadata;
 
 use std::{
@@ -35,6 +36,19 @@ pub(super) fn cdr(seed: i64, len: usize) -> Vec<u8> {
     let mut data = vec![0, 1, 0, 0];
     data.extend((0..len).map(|i| (i as i64 * 31 + seed * 7).rem_euclid(251) as u8));
     data
+}
+
+/// Data that do not compress, with a CDR header.
+pub(crate) fn noise(seed: u32, bytes: usize) -> Vec<u8> {
+    let mut state = seed.wrapping_mul(2_654_435_761) | 1;
+    let mut next = || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        (state >> 24) as u8
+    };
+    let data = (0..bytes).map(|_| next());
+    [0, 1, 0, 0].into_iter().chain(data).collect()
 }
 
 /// Compression of a bag by means of rosbag2.

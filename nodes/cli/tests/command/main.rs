@@ -28,6 +28,7 @@ mod record;
 mod respawn;
 mod signals;
 mod streams;
+mod unsent;
 mod versions;
 mod viewer;
 mod viewer_foreign;

@@ -20,7 +20,7 @@ const PARAMS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/bobcat.y
 
 /// Description of a map without the times and bytes that depend on the way it was made.
 pub fn figures(report: &Value) -> Vec<Value> {
-    let keys = "lattice voxels points mse_per_dimension_m2 map_crc32";
+    let keys = "lattice voxels points mse_per_dimension_m2 map_checksum";
     let lattices = report["lattices"].as_array().unwrap().iter();
     lattices
         .map(|branch| {

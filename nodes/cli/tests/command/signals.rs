@@ -2,17 +2,22 @@
 
 use std::io::{BufRead, BufReader, Write, stderr};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use lattice_runtime::LoopbackDomain;
+use serde_json::Value;
 use wait_timeout::ChildExt;
 
-use crate::PATIENCE;
-use crate::record::{expect, signal, start};
+use crate::nodes::simulated;
+use crate::record::{expect, play, signal, start};
+use crate::{PATIENCE, json};
 
 /// Longest time that a peer may list a node after the signal. A stock node is gone after 0.03 s.
 const LISTED: Duration = Duration::from_millis(500);
+
+/// Longest time from the signal to the end of a process.
+const END: Duration = Duration::from_secs(2);
 
 const PEER: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
@@ -67,4 +72,74 @@ fn two_interrupts_at_once_are_one() {
     assert!(both.success());
     let status = node.wait_timeout(PATIENCE).unwrap().unwrap();
     assert!(status.success(), "{status}");
+}
+
+/// Interrupts a node, which must end in time; its report.
+fn interrupted(mut node: Child, report: &Path) -> Value {
+    let begin = Instant::now();
+    signal(&node, "-INT");
+    let status = node.wait_timeout(PATIENCE).unwrap().unwrap();
+    let ended = begin.elapsed();
+    let _ = writeln!(stderr(), "ended after {ended:?}");
+    assert!(status.success() && ended < END, "{status} after {ended:?}");
+    serde_json::from_slice(&std::fs::read(report).unwrap()).unwrap()
+}
+
+/// Writes the map of a cube of points 1 m apart as the autosave of a mapper; the number of its voxels.
+pub fn grid_map(folder: &Path, edge: u32) -> u64 {
+    let path = |name: &str| folder.join(name).display().to_string();
+    let (points, map) = (path("grid.bin"), path("autosave.lattice"));
+    let place = |i: u32| [i % edge, i / edge % edge, i / (edge * edge)].map(|v| v as f32 + 0.3);
+    let numbers = (0..edge.pow(3)).flat_map(|i| place(i).into_iter().chain([0.0]));
+    let bytes: Vec<u8> = numbers.flat_map(f32::to_le_bytes).collect();
+    std::fs::write(&points, bytes).unwrap();
+    let cubes = ["--lattice", "cubic", "--cell-size", "1"];
+    json(&[&["quantize", &points, "--map-out", &map], &cubes[..]].concat());
+    u64::from(edge.pow(3))
+}
+
+#[test]
+fn a_mapper_of_two_million_voxels_ends_in_time_with_its_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let cells = grid_map(folder.path(), 128);
+    let domain = LoopbackDomain::take().unwrap();
+    let report = path("report");
+    let params = [
+        "lattice:=cubic".to_owned(),
+        "cell_volume_m3:=1.0".to_owned(),
+        format!("map_dir:={}", folder.path().display()),
+        "resume:=true".to_owned(),
+        format!("report_file:={report}"),
+    ];
+    let params = params.iter().flat_map(|param| ["-p", param]);
+    let node = ["node", "lattice_mapper", "--ros-args"].into_iter();
+    let mut mapper = start(&domain, &node.chain(params).collect::<Vec<_>>());
+    expect(&mut mapper, &["resumed with"]);
+    let report = interrupted(mapper, Path::new(&report));
+    assert_eq!(report["voxels"], cells);
+    assert_eq!(report["counts"]["keyframes"], 0);
+}
+
+#[test]
+fn a_player_ends_in_time_at_full_rate_beside_a_follower_that_acknowledges_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = simulated(folder.path(), "mcap", "3");
+    let domain = LoopbackDomain::take().unwrap();
+    let mut follower = start(&domain, &["node", "enu_transformer"]);
+    let report = folder.path().join("report");
+    let params = [
+        "rate:=1000.0".to_owned(),
+        "loop:=true".to_owned(),
+        "wait_for_subscribers:=[/tf]".to_owned(),
+        format!("report_file:={}", report.display()),
+    ];
+    let params: Vec<&str> = params.iter().map(String::as_str).collect();
+    let mut player = play(&domain, &log, &params);
+    expect(&mut player, &["the log restarts"]);
+    signal(&follower, "-STOP");
+    let report = interrupted(player, &report);
+    assert_ne!(report["unacknowledged"], 0, "{report}");
+    signal(&follower, "-KILL");
+    follower.wait().unwrap();
 }

@@ -18,6 +18,10 @@ const ANNOUNCEMENT_PERIOD: &str = "2s";
 /// request that arrives before discovery has finished.
 const FIRST_QUESTION: &str = "1ms";
 
+/// Longest wait of a deleted writer for acknowledgements, one writer after the other. Those that are to be sent are
+/// waited for before; Cyclone's default is 1 s.
+const LINGER_TIME: &str = "50ms";
+
 /// Argument of `dds_create_domain`: comma-separated fragments, of which later ones override earlier ones.
 pub(super) fn config(network: &Network, cyclonedds_uri: Option<&str>) -> String {
     let general = match network.localhost_only {
@@ -46,6 +50,7 @@ pub(super) fn config(network: &Network, cyclonedds_uri: Option<&str>) -> String 
          <MaxAutoParticipantIndex>{}</MaxAutoParticipantIndex>\
          <SPDPInterval>{ANNOUNCEMENT_PERIOD}</SPDPInterval><Peers>{peers}</Peers></Discovery>\
          <Internal><PreEmptiveAckDelay>{FIRST_QUESTION}</PreEmptiveAckDelay>\
+         <WriterLingerDuration>{LINGER_TIME}</WriterLingerDuration>\
          <SocketReceiveBufferSize max=\"{RECEIVE_BUFFER_BYTES}B\"/></Internal>\
          </Domain></CycloneDDS>",
         MAX_PARTICIPANTS - 1

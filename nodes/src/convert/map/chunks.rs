@@ -217,6 +217,17 @@ fn split(keys: &[MortonKey], payload_bytes: usize, chunk_bytes: usize) -> Vec<&[
     parts
 }
 
+/// Bytes of the voxels in a keyframe of one chunk, without its header. `list` has their payload; `None`: keys only.
+pub fn voxel_bytes(keys: &[MortonKey], list: Option<&VoxelList>) -> usize {
+    let mut before = 0;
+    let mut bytes = keys.len() * list.map_or(0, payload_bytes);
+    for key in keys {
+        bytes += varint_len(key.raw() - before);
+        before = key.raw();
+    }
+    bytes
+}
+
 fn varint_len(value: u64) -> usize {
     (64 - (value | 1).leading_zeros()).div_ceil(7) as usize
 }

@@ -13,7 +13,7 @@ mod chunks;
 mod voxels;
 
 pub use checksum::{History, changes_sum, sign};
-pub use chunks::{keyframe, keyframe_of_cells, update, update_of_cells};
+pub use chunks::{keyframe, keyframe_of_cells, update, update_of_cells, voxel_bytes};
 pub use voxels::{VoxelColumns, VoxelState, keys_from, main_label, voxels_from};
 
 use super::geometry;

@@ -16,7 +16,7 @@ impl ComputeState {
             updates_not_published: self.output.updates_lost(),
             chunks_not_published: self.output.chunks_lost(),
             corrections: self.drive.as_ref().map(|drive| drive.counts().clone()),
-            ..MapperReport::of(&mut self.machine)
+            ..MapperReport::of(&self.machine)
         }
     }
 

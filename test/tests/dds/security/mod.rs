@@ -9,14 +9,17 @@ use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::mpsc::channel;
 
+use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use lattice_msgs::std_msgs::String as RosString;
 use lattice_nodes::executables;
 use lattice_runtime::env::Network;
+use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::security::{self, Security};
-use lattice_runtime::{Runtime, RuntimeError, SubscriptionExecutor, lock};
+use lattice_runtime::{Node, Runtime, RuntimeError, Subscription, SubscriptionExecutor, lock};
 use lattice_test::domain::TestDomain;
 use lattice_test::python::{python, script};
 
@@ -25,6 +28,27 @@ use self::peers::{Peer, QOS, talk, topic, until};
 
 /// Words received from a permitted peer while none of others is: 5 s.
 const WORDS: usize = 50;
+
+/// The number of participants that a runtime keeps out, as its diagnostics state it.
+fn kept_out_by(node: &Node) -> (Arc<AtomicU64>, Subscription) {
+    let stated = Arc::<AtomicU64>::default();
+    let newest = Arc::clone(&stated);
+    let name = format!(
+        "{}: transport",
+        node.params().node().trim_start_matches('/')
+    );
+    let hear = move |message: Arc<DiagnosticArray>| {
+        let tasks = message.status.iter().filter(|task| task.name == name);
+        for value in tasks.flat_map(|task| &task.values) {
+            if value.key == "participants_kept_out" {
+                newest.store(value.value.parse().unwrap(), Relaxed);
+            }
+        }
+    };
+    let qos = Qos::DIAGNOSTICS;
+    let heard = node.subscribe("/diagnostics", qos, SubscriptionExecutor::Shared, hear);
+    (stated, heard.unwrap())
+}
 
 /// False, with a line on standard error, where there is nothing to test.
 fn can_run() -> bool {
@@ -67,6 +91,9 @@ fn permitted_peers_hear_each_other_and_nobody_else() {
     let talker = runtime(&domain, "talk", "/ours", Some(ours.enforced())).unwrap();
     let (sender, heard) = channel();
     let _talk = talk(&talker, ("talk", domain.id()), "ours", sender);
+    let node = talker.node("talk").unwrap();
+    let _tasks = node.diagnostics();
+    let (counted, _diagnostics) = kept_out_by(&node);
     let friend = Peer::start(&domain, "friend", Some(&ours));
     // Each stranger has one of its kind, who shows that it can be heard.
     let strangers = [("stranger", Some(&others)), ("open", None)].map(|(kind, keystore)| {
@@ -108,7 +135,8 @@ fn permitted_peers_hear_each_other_and_nobody_else() {
                 .iter()
                 .zip(before)
                 .all(|(now, then)| *now >= then + WORDS);
-            more >= WORDS && all_go_on && kept_out().len() >= 4
+            let counts = [kept_out().len() as u64, counted.load(Relaxed)];
+            more >= WORDS && all_go_on && counts.iter().all(|count| *count >= 4)
         },
     );
     words.remove("");
@@ -117,6 +145,7 @@ fn permitted_peers_hear_each_other_and_nobody_else() {
         let heard: BTreeSet<_> = peer.heard().into_iter().collect();
         assert_eq!(heard, BTreeSet::from([word.to_owned()]));
     }
+    assert_eq!(counted.load(Relaxed), 4);
     let lines = kept_out();
     let addresses: BTreeSet<_> = lines.iter().map(|line| line.split("]: ").last()).collect();
     assert_eq!(
