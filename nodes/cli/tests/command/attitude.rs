@@ -100,11 +100,16 @@ fn attitudes_that_turn_against_the_way_are_refused_with_the_parameter_that_mends
     // Rounding of the quaternions moves points on the border of a cell.
     let common = map.iter().filter(|key| expected.contains(key)).count();
     assert!(100 * common > 99 * expected.len().max(map.len()));
-    // The parameter is for quaternions.
-    let tf = ["--ins", "tf", "-p", "ins.orientation:=ned"];
-    let (status, errors, _) = replay(&ned, &tf);
-    assert!(
-        status == 1 && errors.contains("ins.orientation"),
-        "{errors}"
-    );
+}
+
+#[test]
+fn a_convention_of_quaternions_is_refused_where_the_poses_have_none() {
+    for source in ["tf", "inspvax"] {
+        let source = format!("ins.source:={source}");
+        let given = ["-p", &source, "-p", "ins.orientation:=ned"];
+        let output = lattice(&[&["node", "enu_transformer", "--ros-args"], &given[..]].concat());
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "{errors}");
+        assert!(errors.contains("ins.orientation"), "{errors}");
+    }
 }

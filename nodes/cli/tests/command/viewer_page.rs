@@ -1,11 +1,7 @@
 //! The page's layers and controls on a map of few cells that are known: colours, slice, verdicts, phone.
 
 use lattice_msgs::calibration::{CalibrationResult, WeakDirection};
-use lattice_msgs::geometry_msgs::{Point, PoseStamped, Vector3};
-use lattice_msgs::nav_msgs::Path;
-use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
-use lattice_nodes::convert::geometry;
-use nalgebra::Isometry3;
+use lattice_msgs::geometry_msgs::Vector3;
 use serde_json::json;
 
 use crate::browser::chromium;
@@ -310,30 +306,8 @@ fn the_corrected_path_and_its_loops_are_drawn_in_the_frame_of_the_map() {
     let Some(chromium) = chromium() else { return };
     let stage = Stage::show(&stairs());
     stage.robot_at([1.0, 6.0, 0.0]);
-    let path = |frame: &str| {
-        let pose = |x: f64| {
-            let place = Isometry3::translation(x, 5.0, 0.0);
-            PoseStamped {
-                pose: geometry::pose_from(&place),
-                ..PoseStamped::default()
-            }
-        };
-        Path {
-            header: geometry::header(frame, 1),
-            poses: [0.0, 2.0, 4.0].map(pose).into(),
-        }
-    };
-    let point = |x: f64| Point { x, y: 8.0, z: 0.0 };
-    let lines = MarkerArray {
-        markers: vec![Marker {
-            header: geometry::header("map", 1),
-            ns: "loop_closures".to_owned(),
-            type_: Marker::LINE_LIST,
-            points: [0.0, 10.0].map(point).into(),
-            ..Marker::default()
-        }],
-    };
-    stage.drive(&path("map"), &lines);
+    let path = [0.0, 2.0, 4.0].map(|x| [x, 5.0, 0.0]);
+    stage.drive("map", &path, &[[0.0, 8.0, 0.0], [10.0, 8.0, 0.0]]);
     let mut page = open(&chromium, &stage);
     page.wait_for("lattice.state.robot && lattice.state.drive.length === 3 && lattice.state.loops.length === 2");
     page.value("document.querySelector('[data-camera=top]').click()");
@@ -342,7 +316,7 @@ fn the_corrected_path_and_its_loops_are_drawn_in_the_frame_of_the_map() {
         const step = lattice.camera.distance / lattice.camera.focal(); \
         const [r, g] = look.at([5, 8 + dy * step, 0]); return g > r + 40; }); })()";
     assert_eq!(page.value(is_green), true);
-    stage.drive(&path("odom"), &MarkerArray::default());
+    stage.drive("odom", &path, &[]);
     page.wait_for("lattice.state.drive.length === 0 && lattice.state.loops.length === 0");
     assert_eq!(page.value(is_green), false);
     assert_eq!(page.value("lattice.state.problems"), json!([]));

@@ -8,14 +8,18 @@ use lattice_core::voxels::codec;
 use lattice_msgs::calibration::CalibrationResult;
 use lattice_msgs::cdr;
 use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
-use lattice_msgs::geometry_msgs::{Pose, Quaternion, TransformStamped, Vector3};
+use lattice_msgs::geometry_msgs::{
+    Point, Pose, PoseStamped, Quaternion, TransformStamped, Vector3,
+};
 use lattice_msgs::lattice::{LatticeInfo, LatticeMap};
 use lattice_msgs::nav_msgs::Path;
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
-use lattice_msgs::visualization_msgs::MarkerArray;
+use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
+use lattice_nodes::convert::geometry;
 use lattice_nodes::viewer_server::{Broadcaster, Class, Entry, RequestAuth, Server};
+use nalgebra::Isometry3;
 use serde::Serialize;
 use serde_bytes::ByteBuf;
 
@@ -137,12 +141,30 @@ impl Stage {
             .offer(self.transforms, cdr::to_vec(&message).unwrap());
     }
 
-    /// Publishes the path of a drive and the lines of its loops.
-    pub fn drive(&self, path: &Path, loops: &MarkerArray) {
-        let drive = cdr::to_vec(path).unwrap();
-        self.broadcaster.offer(self.drive, drive);
-        let loops = cdr::to_vec(loops).unwrap();
-        self.broadcaster.offer(self.loops, loops);
+    /// Publishes the path of a drive in a frame, and the lines of its loops in the map.
+    pub fn drive(&self, frame: &str, path: &[[f64; 3]], loops: &[[f64; 3]]) {
+        let pose = |&[x, y, z]: &[f64; 3]| PoseStamped {
+            pose: geometry::pose_from(&Isometry3::translation(x, y, z)),
+            ..PoseStamped::default()
+        };
+        let path = Path {
+            header: geometry::header(frame, 1),
+            poses: path.iter().map(pose).collect(),
+        };
+        let lines = Marker {
+            header: geometry::header("map", 1),
+            ns: "loop_closures".to_owned(),
+            type_: Marker::LINE_LIST,
+            points: loops.iter().map(|&[x, y, z]| Point { x, y, z }).collect(),
+            ..Marker::default()
+        };
+        let lines = MarkerArray {
+            markers: vec![lines],
+        };
+        self.broadcaster
+            .offer(self.drive, cdr::to_vec(&path).unwrap());
+        self.broadcaster
+            .offer(self.loops, cdr::to_vec(&lines).unwrap());
     }
 
     /// States a task of a node, with its values.
