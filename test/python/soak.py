@@ -32,7 +32,7 @@ INS = "/novatel/oem7/inspvax"
 # Topics on which nothing may be lost, with depths that hold a whole log, however long a node is kept from the processor.
 RELIABLE = {topic: 2000 for topic in CLOUDS} | {INS: 2500}
 NODES = {
-    "enu_transformer": RELIABLE | {"/points_enu": 6000},
+    "enu_transformer": RELIABLE | {"/points_enu": 6000, "/tf": 2500},
     "lattice_mapper": {"/points_enu": 6000},
     "voxel_marker_publisher": {},
     "bag_player": RELIABLE,
@@ -211,6 +211,8 @@ def grown(sizes):
 def start(lattice, directory, log, hostile):
     """The nodes but for the player, and the port of the viewer."""
     port, options = free_port(), {"lattice_mapper": {"map_dir": directory.absolute()}}
+    # Poses may come late on a machine with other work.
+    options["enu_transformer"] = {"max_wait_s": 10.0}
     options["viewer_server"] = {"port": port}
     names = STEADY + (ATTACKED if hostile else [])
     nodes = [Node(lattice, name, directory, **options.get(name, {})) for name in names]
