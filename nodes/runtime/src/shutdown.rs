@@ -160,12 +160,19 @@ impl Had {
             false => Effect::Kill,
         }
     }
+
+    /// Time in which a second signal counts as the first; `None`: there was none, or two.
+    fn left(&self, now: Instant) -> Option<Duration> {
+        let first = self.first.filter(|_| !self.second)?;
+        SAME_REQUEST.checked_sub(now.saturating_duration_since(first))
+    }
 }
 
 /// Converts SIGINT and SIGTERM into shutdown requests while it exists. A third signal ends the process at once, as
 /// does a late second one without a [`Writing`] guard.
 pub(crate) struct SignalWatch {
     handle: Handle,
+    had: Arc<Mutex<Had>>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
@@ -175,13 +182,15 @@ impl SignalWatch {
         set_at_once(false);
         let mut signals = Signals::new(SIGNALS)?;
         let handle = signals.handle();
+        let had: Arc<Mutex<Had>> = Arc::default();
+        let taken = Arc::clone(&had);
         let thread = std::thread::Builder::new()
             .name("signals".to_owned())
             .spawn(move || {
-                let mut had = Had::default();
                 for signal in signals.forever() {
+                    let effect = lock(&taken).take(Instant::now(), shutdown.is_writing());
                     // Logged last: logging may block.
-                    match had.take(Instant::now(), shutdown.is_writing()) {
+                    match effect {
                         Effect::Request => {
                             shutdown.request();
                             log::info!("signal {signal}: shutting down");
@@ -199,6 +208,7 @@ impl SignalWatch {
         *watches = watches.saturating_add(1);
         Ok(Self {
             handle,
+            had,
             thread: Some(thread),
         })
     }
@@ -213,7 +223,23 @@ impl Drop for SignalWatch {
         }
         let mut watches = lock(&WATCHES);
         *watches = watches.saturating_sub(1);
-        if *watches == 0 {
+        if *watches > 0 {
+            return;
+        }
+        let left = lock(&self.had).left(Instant::now());
+        // A second signal may come while the process ends.
+        let later = left.map(|left| {
+            let end = move || {
+                std::thread::sleep(left);
+                if *lock(&WATCHES) == 0 {
+                    set_at_once(true);
+                }
+            };
+            std::thread::Builder::new()
+                .name("second signal".to_owned())
+                .spawn(end)
+        });
+        if !matches!(later, Some(Ok(_))) {
             set_at_once(true);
         }
     }
@@ -252,6 +278,14 @@ mod tests {
         assert_eq!(effects((2.9, false), (60.0, true)), [request, wait, kill]);
         assert_eq!(effects((3.1, false), (3.1, false)), [request, kill, kill]);
         assert_eq!(effects((9.0, true), (9.1, true)), [request, wait, kill]);
+
+        let mut had = Had::default();
+        assert_eq!(had.left(start), None);
+        had.take(start, false);
+        assert_eq!(had.left(after(1.0)), Some(Duration::from_secs(2)));
+        assert_eq!(had.left(after(3.1)), None);
+        had.take(after(1.0), false);
+        assert_eq!(had.left(after(1.0)), None, "the next one ends the process");
 
         let shutdown = Shutdown::default();
         let files = [shutdown.writing(), shutdown.clone().writing()];
