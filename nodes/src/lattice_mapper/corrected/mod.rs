@@ -1,5 +1,6 @@
 //! A map whose poses are corrected later: clouds of an odometry are kept, and mapped anew where loops have moved them.
 
+mod counts;
 mod kept_cloud;
 #[cfg(test)]
 mod tests;
@@ -13,8 +14,8 @@ use lattice_core::voxels::file::MapContents;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 use nalgebra::{Isometry3, Vector3};
-use serde::{Deserialize, Serialize};
 
+pub use self::counts::CorrectionCounts;
 use self::kept_cloud::{KeptCloud, SeenCells, Thinned};
 use super::{CloudRefusal, LatticeMapper};
 use crate::convert::corrections::{CorrectionsError, PlacedCorrections};
@@ -26,25 +27,6 @@ const KEPT_PART: f64 = 0.25;
 const MOVED_PART: f64 = 0.1;
 /// Time spent on a map that is made anew, after each event. A scan comes every tenth of a second.
 const STEP: Duration = Duration::from_millis(30);
-
-/// Counters of corrections.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct CorrectionCounts {
-    /// Clouds rejected: no corrections yet.
-    pub clouds_no_corrections: u64,
-    /// Clouds rejected: of another drive than the map.
-    pub clouds_other_drive: u64,
-    /// Clouds in submaps whose place in the map is unknown now.
-    pub clouds_unplaced: u64,
-    /// Clouds that were mapped and not kept, beyond `max_kept_bytes`.
-    pub clouds_not_kept: u64,
-    /// Points beside a kept one in its cell of a quarter of the edge, which are not mapped.
-    pub points_thinned: u64,
-    /// Messages of corrections that are malformed.
-    pub corrections_refused: u64,
-    /// Maps made anew.
-    pub maps_corrected: u64,
-}
 
 /// Clouds of a drive and their corrections.
 pub struct CorrectedDrive {
