@@ -42,6 +42,8 @@ pub struct CorrectedDrive {
     renewal: Option<Renewal>,
     /// False after corrections that moved no cloud by much.
     may_be_moved: bool,
+    /// True if clouds were mapped that are not kept.
+    is_full: bool,
     counts: CorrectionCounts,
 }
 
@@ -83,6 +85,7 @@ impl CorrectedDrive {
             base: None,
             renewal: None,
             may_be_moved: false,
+            is_full: false,
             counts: CorrectionCounts::default(),
         };
         drive.restart(machine);
@@ -93,7 +96,7 @@ impl CorrectedDrive {
     pub fn restart(&mut self, machine: &LatticeMapper) {
         self.clouds.clear();
         self.seen.clear();
-        (self.bytes, self.renewal) = (0, None);
+        (self.bytes, self.renewal, self.is_full) = (0, None, false);
         self.counts.clouds_unplaced = 0;
         self.base = (!machine.cells().is_empty()).then(|| machine.contents());
         if let Some(followed) = &mut self.corrections {
@@ -200,7 +203,8 @@ impl CorrectedDrive {
 
     fn keep(&mut self, cloud: KeptCloud, forget_after_ns: i64) {
         let bytes = cloud.bytes();
-        if self.is_full() || self.bytes + bytes > self.max_bytes {
+        if self.is_full || self.bytes + bytes > self.max_bytes {
+            self.is_full = true;
             self.counts.clouds_not_kept += 1;
             // A map made anew would lack this cloud.
             self.renewal = None;
@@ -219,11 +223,6 @@ impl CorrectedDrive {
         }
     }
 
-    /// True if clouds were mapped that are not kept: the map is not corrected any more.
-    pub fn is_full(&self) -> bool {
-        self.counts.clouds_not_kept > 0
-    }
-
     /// Status in one line, where clouds are not mapped or not corrected.
     pub fn problem(&self) -> Option<String> {
         let counts = &self.counts;
@@ -231,7 +230,7 @@ impl CorrectedDrive {
         if self.corrections.as_ref().is_some_and(is_other) {
             return Some(CloudRefusal::OtherDrive.to_string());
         }
-        if self.is_full() {
+        if self.is_full {
             let problem = "`max_kept_bytes` is reached: later corrections do not move the map";
             return Some(problem.to_owned());
         }
@@ -359,7 +358,7 @@ impl CorrectedDrive {
         let Some(followed) = &self.corrections else {
             return Ok(false);
         };
-        let is_due = self.may_be_moved && !followed.is_other_drive && !self.is_full();
+        let is_due = self.may_be_moved && !followed.is_other_drive && !self.is_full;
         self.may_be_moved = false;
         let mut clouds = self.clouds.iter();
         if !is_due || !clouds.any(|cloud| self.is_moved(cloud, least_m)) {

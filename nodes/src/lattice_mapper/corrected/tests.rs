@@ -225,7 +225,7 @@ fn beyond_its_memory_the_map_grows_and_is_not_corrected() {
         drive.on_cloud(&mut machine, &cloud).unwrap();
     }
     let counts = drive.counts().clone();
-    assert!(counts.clouds_not_kept > 0 && drive.is_full());
+    assert!(counts.clouds_not_kept > 0 && drive.is_full);
     let voxels = machine.list().sorted();
     drive
         .on_corrections(&corrections(anchors(3.0), &[]))
@@ -233,6 +233,11 @@ fn beyond_its_memory_the_map_grows_and_is_not_corrected() {
     assert!(!drive.finish(&mut machine, epoch).unwrap());
     assert_eq!(machine.list().sorted(), voxels);
     assert!(drive.problem().unwrap().contains("max_kept_bytes"));
+    // An empty map has room again.
+    machine.reset(8);
+    drive.restart(&machine);
+    drive.on_cloud(&mut machine, &wall(200, 0.0)).unwrap();
+    assert_eq!((drive.clouds.len(), drive.problem()), (1, None));
 }
 
 #[test]
