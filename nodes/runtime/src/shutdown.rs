@@ -371,6 +371,9 @@ mod tests {
         shutdown.wait();
         assert!(!at_once.load(Ordering::Relaxed), "the second one waits");
         drop(watch);
+        let is_kill = at_once.load(Ordering::Relaxed);
+        assert!(!is_kill, "a second one may come while the process ends");
+        drop(SignalWatch::start(Shutdown::default()).unwrap());
         assert!(at_once.load(Ordering::Relaxed), "nobody watches");
         let _again = SignalWatch::start(Shutdown::default()).unwrap();
         assert!(!at_once.load(Ordering::Relaxed), "someone else does");
