@@ -7,7 +7,6 @@ use std::sync::{Arc, Mutex, Once};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use lattice_core::raycast::FreeSpaceError;
 use lattice_msgs::geographic_msgs::GeoPointStamped;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
@@ -288,7 +287,7 @@ impl ComputeState {
             }
             Event::Finish => return self.finish(),
         }
-        self.correct(CorrectedDrive::step);
+        self.correct(false);
     }
 
     /// The map is another one, from a file or empty.
@@ -300,18 +299,15 @@ impl ComputeState {
     }
 
     /// Makes the map anew where corrections move it.
-    fn correct(
-        &mut self,
-        work: fn(
-            &mut CorrectedDrive,
-            &mut LatticeMapper,
-            fn() -> u64,
-        ) -> Result<bool, FreeSpaceError>,
-    ) {
+    fn correct(&mut self, to_end: bool) {
         let Some(drive) = &mut self.drive else {
             return;
         };
-        match work(drive, &mut self.machine, epoch) {
+        let corrected = match to_end {
+            true => drive.finish(&mut self.machine, epoch),
+            false => drive.step(&mut self.machine, epoch),
+        };
+        match corrected {
             Ok(true) => self.output.replaced(),
             Ok(false) => {}
             Err(error) => log::error!("the map is not corrected: {error}"),
@@ -363,7 +359,7 @@ impl ComputeState {
         {
             log::error!("a map file was not completed");
         }
-        self.correct(CorrectedDrive::finish);
+        self.correct(true);
         self.autosave.finish(&self.machine);
         self.update();
         let mut left = usize::MAX;

@@ -19,7 +19,7 @@ const QUEUE: usize = 64;
 /// What the thread is given.
 enum Work {
     NewDrive(u32),
-    Segment(Segment),
+    Segment(Box<Segment>),
 }
 
 /// Loops and corrections of the drive so far.
@@ -102,7 +102,7 @@ impl LiveLoops {
             self.send(Work::NewDrive(drive));
         }
         if let Some(segment) = &found.segment {
-            self.send(Work::Segment(segment.clone()));
+            self.send(Work::Segment(Box::new(segment.clone())));
         }
         if found.result.verdict == Verdict::Ok {
             let result = &found.result;
@@ -145,7 +145,7 @@ fn seek(queue: &Receiver<Work>, state: &Mutex<LoopState>, on_change: &dyn Fn()) 
         match work {
             Work::NewDrive(number) => (closer, drive) = (LoopCloser::default(), number),
             Work::Segment(segment) => {
-                if let Err(error) = closer.add(segment) {
+                if let Err(error) = closer.add(*segment) {
                     log::debug!("no loop is sought: {error}");
                     continue;
                 }
