@@ -8,7 +8,7 @@ use super::{EnuTransformer, InsSource, TransformerOptions};
 /// Attitudes that contradict the way of the machine.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AttitudeReport {
-    /// What contradicts, and the parameter to set.
+    /// The contradiction, and the parameter to set.
     pub text: String,
     /// True if no machine moves so: the map is wrong.
     pub is_impossible: bool,

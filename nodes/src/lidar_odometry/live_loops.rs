@@ -16,7 +16,7 @@ use crate::convert::corrections::PlacedCorrections;
 /// Segments that wait for the thread: at half a range of path each, hundreds of metres.
 const QUEUE: usize = 64;
 
-/// What the thread is given.
+/// Work of the thread.
 enum Work {
     NewDrive(u32),
     Segment(Box<Segment>),

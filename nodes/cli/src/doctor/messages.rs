@@ -88,7 +88,7 @@ impl Messages {
         })
     }
 
-    /// What has been received.
+    /// Messages received so far.
     pub fn facts(&self) -> TimeFacts {
         let received = lock(&self.received);
         let simulated_ns = received.simulated_ns.unwrap_or(0);

@@ -69,7 +69,7 @@ fn drive_of(machine: &LatticeMapper) -> CorrectedDrive {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whenever corrections come, the map in the end is the one of the kept clouds with the last corrections, to the bit.
+    /// After corrections at any times the map in the end is the one of the kept clouds with the last corrections, to the bit.
     #[test]
     fn a_corrected_map_is_the_one_made_with_corrected_poses(
         moves in prop::collection::vec((0..40_i64, prop::array::uniform3(-1.0..1.0_f64)), 1..12),

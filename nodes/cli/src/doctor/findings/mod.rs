@@ -39,7 +39,7 @@ impl Severity {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Finding {
     pub severity: Severity,
-    /// What was checked, a word or two.
+    /// The check, in a word or two.
     pub check: &'static str,
     pub problem: String,
     pub remedy: String,
