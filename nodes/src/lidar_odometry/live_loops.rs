@@ -16,11 +16,8 @@ use crate::convert::corrections::PlacedCorrections;
 /// Segments that wait for the thread: at half a range of path each, hundreds of metres.
 const QUEUE: usize = 64;
 
-/// Work of the thread.
-enum Work {
-    NewDrive(u32),
-    Segment(Box<Segment>),
-}
+/// A segment with the number of its drive.
+type Work = (u32, Segment);
 
 /// Loops and corrections of the drive so far.
 #[derive(Clone, Debug, Default)]
@@ -31,7 +28,6 @@ pub(super) struct LoopState {
     pub corrections: PlacedCorrections,
     /// Places of both ends of each loop that closed, metres in the map.
     pub lines_m: Vec<[Vector3<f64>; 2]>,
-    pub closed: u64,
     pub refused: u64,
     /// Submaps that have begun: number, end of the last scan before, time of the first point, ns.
     begun: Vec<(u32, i64, i64)>,
@@ -90,28 +86,22 @@ impl LiveLoops {
 
     /// Takes a scan of the drive.
     pub fn on_scan(&mut self, found: &Registered) {
-        let drive = found.drive;
-        if lock(&self.state).drive != drive {
-            let mut state = lock(&self.state);
+        let (drive, result) = (found.drive, &found.result);
+        if let Some(segment) = &found.segment {
+            let sent = self.work.try_send((drive, segment.clone()));
+            self.segments_queue_full += u64::from(sent.is_err());
+        }
+        let mut state = lock(&self.state);
+        if state.drive != drive {
             *state = LoopState {
                 drive,
                 version: state.version + 1,
                 ..LoopState::default()
             };
-            drop(state);
-            self.send(Work::NewDrive(drive));
         }
-        if let Some(segment) = &found.segment {
-            self.send(Work::Segment(Box::new(segment.clone())));
+        if result.verdict == Verdict::Ok {
+            state.on_scan(result.submap, result.first_ns, result.end_ns);
         }
-        if found.result.verdict == Verdict::Ok {
-            let result = &found.result;
-            lock(&self.state).on_scan(result.submap, result.first_ns, result.end_ns);
-        }
-    }
-
-    fn send(&mut self, work: Work) {
-        self.segments_queue_full += u64::from(self.work.try_send(work).is_err());
     }
 
     /// State of now, if its number is not `version`.
@@ -134,25 +124,23 @@ impl LiveLoops {
     /// Numbers of loops that closed and that were refused.
     pub fn counts(&self) -> [u64; 2] {
         let state = lock(&self.state);
-        [state.closed, state.refused]
+        [state.lines_m.len() as u64, state.refused]
     }
 }
 
 /// Seeks loops until the queue ends.
 fn seek(queue: &Receiver<Work>, state: &Mutex<LoopState>, on_change: &dyn Fn()) {
     let (mut closer, mut drive) = (LoopCloser::default(), 0);
-    for work in queue {
-        match work {
-            Work::NewDrive(number) => (closer, drive) = (LoopCloser::default(), number),
-            Work::Segment(segment) => {
-                if let Err(error) = closer.add(*segment) {
-                    log::debug!("no loop is sought: {error}");
-                    continue;
-                }
-                renew(&mut lock(state), &closer, drive);
-                on_change();
-            }
+    for (of_drive, segment) in queue {
+        if of_drive != drive {
+            (closer, drive) = (LoopCloser::default(), of_drive);
         }
+        if let Err(error) = closer.add(segment) {
+            log::debug!("no loop is sought: {error}");
+            continue;
+        }
+        renew(&mut lock(state), &closer, drive);
+        on_change();
     }
 }
 
@@ -185,8 +173,7 @@ fn renew(state: &mut LoopState, closer: &LoopCloser, drive: u32) {
     state.lines_m = closed
         .map(|attempt| [attempt.from, attempt.to].map(place))
         .collect();
-    state.closed = state.lines_m.len() as u64;
-    state.refused = closer.attempts().len() as u64 - state.closed;
+    state.refused = (closer.attempts().len() - state.lines_m.len()) as u64;
     state.corrections = PlacedCorrections {
         corrections,
         placed,
