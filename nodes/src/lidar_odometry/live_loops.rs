@@ -180,3 +180,23 @@ fn renew(state: &mut LoopState, closer: &LoopCloser, drive: u32) {
     };
     state.version += 1;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_submap_begins_without_a_place_in_the_middle_of_the_pause() {
+        let mut state = LoopState::default();
+        for end_ns in [1000, 1100] {
+            state.on_scan(0, end_ns - 100, end_ns);
+        }
+        let first = state.corrections.clone();
+        assert_eq!((first.corrections.anchors().len(), state.version), (1, 1));
+        assert!(first.map_from_odom(5000).is_some());
+        state.on_scan(1, 2900, 3000);
+        let lost = &state.corrections;
+        assert!(lost.map_from_odom(1999).is_some() && lost.map_from_odom(2000).is_none());
+        assert_eq!(state.version, 2);
+    }
+}
