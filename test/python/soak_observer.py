@@ -16,6 +16,8 @@ SaveMapResponse = ros.ros(
 )
 # Encapsulation of a CDR message, and what a request over DDS has between it and its fields.
 ENCAPSULATION, HEADER = 4, 16
+# QoS of a token: reliable, depth 10.
+RELIABLE = "::,10:,:,:,,"
 
 
 class Observer:
@@ -75,15 +77,20 @@ class OverZenoh(Observer):
 
         self.peer = Peer(endpoint, domain)
         self.asked = {name: self.client(name) for name in ("save_map", "reset")}
-        key = self.peer.key(DIAGNOSTICS, ("*", "*"))
+        of = self.type_of("MP", DIAGNOSTICS)
+        key = self.peer.key(DIAGNOSTICS, of)
         self.peer.kept.append(self.peer.session.declare_subscriber(key, self.heard))
+        self.peer.token("MS", DIAGNOSTICS, of, RELIABLE)
+
+    def type_of(self, kind, name):
+        """Type and hash of an endpoint, as the mapper has them in its token."""
+        return self.peer.token_of("lattice_mapper", kind, name).split("/")[10:12]
 
     def client(self, name):
-        """Name and type of a service as the mapper has them in its token, and the gid of a client here."""
+        """Name and type of a service, and the gid of a client here."""
         service = f"/lattice_mapper/{name}"
-        token = self.peer.token_of("lattice_mapper", "SS", service)
-        of = token.split("/")[10:12]
-        return service, of, self.peer.token("SC", service, of, "::,10:,:,:,,")
+        of = self.type_of("SS", service)
+        return service, of, self.peer.token("SC", service, of, RELIABLE)
 
     def heard(self, sample):
         message = ros.DiagnosticArray.deserialize(bytes(sample.payload))
