@@ -277,7 +277,7 @@ impl MapProjector {
         self.follower.differences()
     }
 
-    /// Frame of the map.
+    /// Frame of the map; `None` before its first keyframe.
     pub fn map_frame(&self) -> Option<&str> {
         self.follower.map().map(|map| map.frame_id.as_str())
     }

@@ -71,7 +71,7 @@ impl Scans {
         match found.verdict {
             Verdict::Ok => Ok(found.target_from_source),
             verdict => Err(format!(
-                "the whole scan is {}: {}; give its pose",
+                "no pose of the whole scan, verdict {}: {}; give it by --truth FILE",
                 verdict.name(),
                 found.reason
             )
