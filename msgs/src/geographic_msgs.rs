@@ -17,11 +17,11 @@ messages! {
 /// A place on earth, WGS 84.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GeoPoint {
-    /// In deg, north positive, in [-90, 90].
+    /// Latitude, degrees, north positive, in [-90, 90].
     pub latitude: f64,
-    /// In deg, east positive, in [-180, 180].
+    /// Longitude, degrees, east positive, in [-180, 180].
     pub longitude: f64,
-    /// In m above the ellipsoid, NaN where unknown.
+    /// Height above the ellipsoid, m; NaN if unknown.
     pub altitude: f64,
 }
 
@@ -39,7 +39,7 @@ pub struct GeoPointStamped {
 pub struct GeoPose {
     /// The place.
     pub position: GeoPoint,
-    /// In the east-north-up frame at that place.
+    /// Orientation in the east-north-up frame at that position.
     pub orientation: Quaternion,
 }
 

@@ -82,7 +82,7 @@ impl Default for Quaternion {
 /// Position and orientation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// In m.
+    /// Position, m.
     pub position: Point,
     /// Unit quaternion.
     pub orientation: Quaternion,
@@ -128,9 +128,9 @@ pub struct PoseWithCovarianceStamped {
 /// Velocity in free space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Twist {
-    /// In m/s.
+    /// Linear velocity, m/s.
     pub linear: Vector3,
-    /// In rad/s.
+    /// Angular velocity, rad/s.
     pub angular: Vector3,
 }
 
@@ -156,7 +156,7 @@ impl Default for TwistWithCovariance {
 /// A rigid transform.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Transform {
-    /// In m.
+    /// Translation, m.
     pub translation: Vector3,
     /// Unit quaternion.
     pub rotation: Quaternion,

@@ -62,7 +62,7 @@ pub struct LatticeMap {
     pub key_encoding: String,
     /// Voxels in this chunk.
     pub voxels: u32,
-    /// Their lattice indices: Morton keys, ascending, as LEB128 differences, the first absolute.
+    /// Lattice indices of the voxels: Morton keys, ascending, as LEB128 differences, the first absolute.
     pub keys: ByteBuf,
     /// Points in each voxel; empty: not kept.
     pub counts: Vec<u32>,
@@ -74,7 +74,7 @@ pub struct LatticeMap {
     pub labels: Vec<u16>,
     /// Points with that label in each voxel; empty: not kept.
     pub label_counts: Vec<u32>,
-    /// Of all updates of the epoch up to the sequence; the text of LatticeMapUpdate says how.
+    /// Checksum of all updates of the epoch up to the sequence, as the text of LatticeMapUpdate defines it.
     pub history_checksum: u64,
 }
 
@@ -104,7 +104,7 @@ pub struct LatticeMapUpdate {
     pub key_encoding: String,
     /// Voxels in this chunk.
     pub voxels: u32,
-    /// Their lattice indices: Morton keys, ascending, as LEB128 differences, the first absolute.
+    /// Lattice indices of the changed voxels: Morton keys, ascending, as LEB128 differences, the first absolute.
     pub keys: ByteBuf,
     /// Points in each voxel; empty: not kept.
     pub counts: Vec<u32>,
@@ -118,11 +118,11 @@ pub struct LatticeMapUpdate {
     pub label_counts: Vec<u32>,
     /// Voxels that are gone.
     pub removed: u32,
-    /// Their keys, written as in keys.
+    /// Lattice indices of the removed voxels, encoded as `keys`.
     pub removed_keys: ByteBuf,
     /// Voxels of the map after all chunks are applied.
     pub voxels_total: u64,
-    /// Of all updates of the epoch, this one included.
+    /// Checksum of all updates of the epoch, this one included.
     pub history_checksum: u64,
 }
 
@@ -199,14 +199,14 @@ pub struct ClearBoxResponse {
     pub removed: u64,
 }
 
-/// Asks what is occupied around a point.
+/// Query of the occupied cells around a point.
 #[derive(Clone, Copy, Debug)]
 pub struct QueryMap;
 
 /// Request of [`QueryMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct QueryMapRequest {
-    /// In the map frame, m.
+    /// Position in the map frame, m.
     pub point: Point,
 }
 
@@ -231,16 +231,16 @@ pub struct QueryMapResponse {
     pub nearest_distance_m: f64,
 }
 
-/// Asks for the shortest path of a ball that touches no occupied cell of the map.
+/// Query of the shortest path of a ball that touches no occupied cell of the map.
 #[derive(Clone, Copy, Debug)]
 pub struct PlanPath;
 
 /// Request of [`PlanPath`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlanPathRequest {
-    /// In the map frame, m.
+    /// Start in the map frame, m.
     pub start: Point,
-    /// In the map frame, m.
+    /// Goal in the map frame, m.
     pub goal: Point,
     /// Radius of the ball, m.
     pub radius_m: f64,

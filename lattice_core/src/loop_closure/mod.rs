@@ -84,7 +84,7 @@ pub struct LoopCloser {
 }
 
 impl LoopCloser {
-    /// Takes the next segment of a drive; gives the loop that was tried, if the segment lies near another.
+    /// Adds the next segment of a drive. Returns the attempted loop, if the segment lies near another.
     ///
     /// Fails if its distances give no lattice of places.
     pub fn add(&mut self, segment: Segment) -> Result<Option<&LoopAttempt>, LatticeError> {

@@ -55,8 +55,8 @@ pub struct SegmentCutter {
 }
 
 impl SegmentCutter {
-    /// Takes a scan with its centroids, metres in the frame of the base at its pose, of cells of `side_m`; gives the segment that
-    /// ends before it. Scans that are not `OK` are passed over.
+    /// Adds a scan with its centroids, metres in the frame of the base at its pose, of cells of `side_m`. Returns the
+    /// segment that ends before it. Scans that are not `OK` are skipped.
     ///
     /// Fails if `side_m` gives no lattice.
     pub fn add(

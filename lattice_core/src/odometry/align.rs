@@ -64,7 +64,7 @@ impl Equations {
 #[derive(Clone, Debug)]
 pub(super) struct Alignment {
     pub map_from_base: Isometry3<f64>,
-    /// Of a perturbation (translation, rotation) in the axes of the map about the base, m and rad.
+    /// Information of a perturbation (translation, rotation) about the base, in the axes of the map, m and rad.
     pub information: Matrix6<f64>,
     pub geometry: Geometry,
     /// Part of the points that the map explains.
@@ -294,7 +294,7 @@ impl Geometry {
         self.displaced[(0, 0)].max(0.0).sqrt()
     }
 
-    /// Holds directions that are weak here.
+    /// Fixes the directions that are weak here.
     pub fn hold(&self, weak: &[WeakDirection]) -> Held {
         Held {
             motions: weak.iter().map(|weak| weak.motion).collect(),

@@ -77,7 +77,7 @@ impl MomentMap {
         }
     }
 
-    /// Takes out points that were added, metres.
+    /// Subtracts points that were added before, metres.
     pub fn subtract(&mut self, points_m: &[Vector3<f64>]) {
         for point in points_m {
             self.change(point, -1);

@@ -28,7 +28,7 @@ pub struct Prior<'a> {
 /// Constant velocity with the deviations from it.
 #[derive(Clone, Debug)]
 pub(super) struct Motion {
-    /// In the base frame, m/s and rad/s; `None` before two scans were registered.
+    /// Velocity in the base frame, m/s and rad/s; `None` before two scans were registered.
     velocity: Option<Vector6<f64>>,
     /// Sum and number of squared deviations that make the gate.
     squares: f64,
@@ -78,7 +78,7 @@ impl Motion {
         3.0 * (self.squares / self.count).sqrt()
     }
 
-    /// Takes the motion that registration found.
+    /// Updates the velocity by the motion that registration found.
     pub fn update(
         &mut self,
         found: &Isometry3<f64>,

@@ -24,11 +24,11 @@ const MAX_STEPS: u32 = 12;
 /// Cell sizes of a scan and of its map, cube roots of volumes, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sizes {
-    /// Of the map.
+    /// Cell size of the map.
     pub map_m: f64,
-    /// Of the centroids that go into the map.
+    /// Cell size of the centroids added to the map.
     pub centroids_m: f64,
-    /// Of the points that are registered.
+    /// Cell size of the registered points.
     pub registered_m: f64,
 }
 

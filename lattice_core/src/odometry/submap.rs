@@ -211,7 +211,7 @@ impl Submap {
         Ok(())
     }
 
-    /// Takes a judged scan: pose, motion, covariance, and the map if it is certain.
+    /// Adds a judged scan: pose, motion, covariance, and the map if its pose is certain.
     pub fn follow(
         &mut self,
         (first_ns, end_ns): (i64, i64),

@@ -75,7 +75,7 @@ pub enum RuntimeError {
     /// A thread panicked.
     #[error("thread {thread} panicked; this is a bug, please report the message above")]
     Panicked {
-        /// Its name.
+        /// Name of the thread.
         thread: &'static str,
     },
     /// The runtime has shut down.
@@ -113,7 +113,7 @@ pub enum PublishError {
         topic: String,
         /// Length of the message.
         bytes: usize,
-        /// Its first bytes, up to four.
+        /// First bytes of the message, up to four.
         header: Vec<u8>,
     },
 }

@@ -174,7 +174,7 @@ impl EnuTransformer {
         self.options = options;
     }
 
-    /// Takes a message of the INS on a topic.
+    /// Handles a message of the INS on a topic.
     pub fn on_ins(&mut self, topic: &str, message: InsMessage, now_ns: i64) -> Vec<EnuOutput> {
         let mut out = Vec::new();
         self.advance(now_ns);
@@ -194,7 +194,7 @@ impl EnuTransformer {
         out
     }
 
-    /// Takes a cloud of a sensor on a topic; it comes out at once or when its poses have come.
+    /// Handles a cloud of a sensor on a topic; it is returned at once, or later when its poses have arrived.
     pub fn on_cloud(
         &mut self,
         topic: &str,

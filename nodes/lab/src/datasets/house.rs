@@ -106,7 +106,7 @@ pub struct SceneTruth {
     pub axes: HeadsetAxes,
     /// A cloud for each headset scan, in the same frame.
     pub headset_scans: Vec<HeadsetScanTruth>,
-    /// The pose that a calibration looks for.
+    /// True pose of the headset in the map.
     pub map_from_headset: Pose,
     /// Side of a voxel of the headset's mesh, m.
     pub voxel_m: f64,

@@ -20,7 +20,7 @@ pub struct MultiResolutionList {
 }
 
 impl MultiResolutionList {
-    /// An empty list of so many levels, the finest with the cells of `finest`, their datums near
+    /// Creates an empty list of `levels` levels, the finest with the cells of `finest`, their datums near
     /// `datum_near_m` (map frame, metres). All levels together hold at most `max_bytes`.
     pub fn new(
         finest: &Lattice,

@@ -31,10 +31,10 @@ const CAMERA: &str = "camera";
 const HEADSET: &str = "headset_origin";
 /// Time between images, ns.
 const PERIOD_NS: i64 = 1_000_000_000;
-/// Every so many columns and rows of a depth image become points.
+/// Step of the columns and rows of a depth image that become points.
 const STRIDE: usize = 2;
 
-/// One thing with the labels of the network, and the same with true labels.
+/// Result with the labels of the network, and the same with true labels.
 pub(super) struct Both<T> {
     pub found: T,
     pub truth: T,

@@ -125,7 +125,7 @@ fn file(path: &Path, number: usize, options: &Options) -> Result<Scan, AnyError>
     })
 }
 
-/// Some of the points, at most so many, drawn at random, in their order.
+/// Random subset of at most `most` points, in their order.
 fn thinned(points: Vec<[f32; 3]>, most: usize, seed: u64, number: usize) -> Vec<[f32; 3]> {
     let mut stream = stream(seed, Purpose::Thin, number);
     let (mut left, mut wanted) = (points.len() as f64, most as f64);
