@@ -140,18 +140,18 @@ pub struct SaveMap;
 /// Request of [`SaveMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SaveMapRequest {
-    /// Name below `map_dir`; a map that is there is replaced once the new one is complete.
+    /// File name below `map_dir`; an existing map is replaced once the new one is complete.
     pub path: String,
 }
 
 /// Response of [`SaveMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SaveMapResponse {
-    /// True: done.
+    /// True if the call succeeded.
     pub success: bool,
-    /// Explanation of the outcome.
+    /// Explanation of the result.
     pub message: String,
-    /// Voxels in the file.
+    /// Number of voxels in the file.
     pub voxels: u64,
 }
 
@@ -169,11 +169,11 @@ pub struct LoadMapRequest {
 /// Response of [`LoadMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LoadMapResponse {
-    /// True: done; false: the map is as before.
+    /// True if the map was loaded; otherwise it is unchanged.
     pub success: bool,
-    /// Explanation of the outcome.
+    /// Explanation of the result.
     pub message: String,
-    /// Voxels in the map now.
+    /// Number of voxels of the loaded map.
     pub voxels: u64,
 }
 
@@ -184,20 +184,20 @@ pub struct ClearBox;
 /// Request of [`ClearBox`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ClearBoxRequest {
-    /// Lower corner, m.
+    /// Lower corner in the map frame, m.
     pub min: Point,
-    /// Upper corner, m.
+    /// Upper corner in the map frame, m.
     pub max: Point,
 }
 
 /// Response of [`ClearBox`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ClearBoxResponse {
-    /// True: done.
+    /// True if the call succeeded.
     pub success: bool,
-    /// Explanation of the outcome.
+    /// Explanation of the result.
     pub message: String,
-    /// Voxels that went.
+    /// Number of removed voxels.
     pub removed: u64,
 }
 
@@ -215,21 +215,21 @@ pub struct QueryMapRequest {
 /// Response of [`QueryMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct QueryMapResponse {
-    /// False: not answered, the message says why.
+    /// True if the query was answered; otherwise `message` has the reason.
     pub success: bool,
-    /// Explanation of the outcome.
+    /// Explanation of the result.
     pub message: String,
     /// True if the cell of the point is occupied.
     pub occupied: bool,
-    /// Points in this cell.
+    /// Number of points in this cell.
     pub points: u32,
-    /// False: the map is empty.
+    /// True unless the map is empty.
     pub has_nearest: bool,
-    /// Distance to the nearest occupied cell, 0 inside of one, m.
+    /// Distance from the point to the nearest occupied cell, m; 0 inside it.
     pub clearance_m: f64,
-    /// Centre of the occupied cell that is nearest to the point, m.
+    /// Nearest centre of an occupied cell in the map frame, m.
     pub nearest: Point,
-    /// Distance to this centre, m.
+    /// Distance from the point to this centre, m.
     pub nearest_distance_m: f64,
 }
 
@@ -246,19 +246,19 @@ pub struct PlanPathRequest {
     pub goal: Point,
     /// Radius of the ball, m.
     pub radius_m: f64,
-    /// Distance that an end may move to where the ball fits, m.
+    /// Distance by which start and goal may be moved to a position where the ball fits, m.
     pub tolerance_m: f64,
 }
 
 /// Response of [`PlanPath`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlanPathResponse {
-    /// False: no path, the message says why.
+    /// True if a path was found; otherwise `message` has the reason.
     pub success: bool,
-    /// Explanation of the outcome.
+    /// Explanation of the result.
     pub message: String,
     /// Length of the path, m.
     pub length_m: f64,
-    /// Centres of its cells, from start to goal, in the map frame, m.
+    /// Centres of the cells of the path, from start to goal, in the map frame, m.
     pub path: Vec<Point>,
 }

@@ -42,7 +42,7 @@ const LEAST_SIGMA_M: f64 = 0.05;
 /// Number of loops above which that deviation grows with their number. The number of loops is then proportional to
 /// the cube root of the length of the drive, and the linear system of the graph stays small.
 const MANY_LOOPS: usize = 200;
-/// Number of segments before and after the nearest one that are registered with it.
+/// Number of segments before and after the nearest one that are added to the target cloud.
 const AROUND: usize = 2;
 /// Squared Mahalanobis distance up to which a loop agrees with the graph: 99.9 % quantile of 6 degrees of freedom.
 const EXPLAINED: f64 = 22.5;

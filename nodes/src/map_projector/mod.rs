@@ -267,7 +267,7 @@ impl MapProjector {
         self.error.as_ref()
     }
 
-    /// Voxels of the current map.
+    /// Number of voxels of the followed map; 0 before its first keyframe.
     pub fn voxels(&self) -> usize {
         self.follower.map().map_or(0, |map| map.voxels().len())
     }

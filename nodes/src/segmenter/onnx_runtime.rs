@@ -97,7 +97,7 @@ fn load() -> Result<(), String> {
         Ok(())
     }));
     let loaded = loaded
-        .unwrap_or_else(|_| Err("it does not have the required interface version".to_owned()));
+        .unwrap_or_else(|_| Err("it lacks the interface of version 1.17".to_owned()));
     loaded.map_err(|problem| {
         let path = path.display();
         let problem = checks::shown(&problem);

@@ -129,7 +129,7 @@ fn beside(uri: &str, folder: Option<&Path>, length: u64) -> Result<Vec<u8>, Stri
     let folder = folder.ok_or("separate buffer files are not supported here; use GLB or data URIs")?;
     let path = inside(uri).ok_or_else(|| {
         let uri: String = uri.chars().take(80).collect();
-        format!("'{uri}' leads out of the folder of the file")
+        format!("'{uri}' leads out of the folder of the file: put its buffers there or below")
     })?;
     let failed = |error: std::io::Error| format!("{}: {error}", path.display());
     // A link may lead outside, too.
@@ -137,7 +137,7 @@ fn beside(uri: &str, folder: Option<&Path>, length: u64) -> Result<Vec<u8>, Stri
     let full = folder.join(&path).canonicalize().map_err(failed)?;
     if !full.starts_with(&folder) {
         return Err(format!(
-            "{} leads out of the folder of the file",
+            "{} leads out of the folder of the file: put its buffers there or below",
             path.display()
         ));
     }
