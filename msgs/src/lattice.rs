@@ -221,7 +221,7 @@ pub struct QueryMapResponse {
     pub message: String,
     /// True if the cell of the point is occupied.
     pub occupied: bool,
-    /// Number of points in this cell.
+    /// Number of points in this cell; 0 if the map does not count them (`payload: occupancy`).
     pub points: u32,
     /// True unless the map is empty.
     pub has_nearest: bool,
