@@ -91,7 +91,9 @@ pub enum RuntimeError {
 #[non_exhaustive]
 pub enum PublishError {
     /// The queue is full.
-    #[error("{topic}: the queue of the publisher is full, message dropped ({dropped} so far): publish fewer or smaller messages")]
+    #[error(
+        "{topic}: the queue of the publisher is full, message dropped ({dropped} so far): publish fewer or smaller messages"
+    )]
     QueueFull {
         /// Resolved topic.
         topic: String,

@@ -90,10 +90,14 @@ fn content<'a>(
 ) -> Result<Cow<'a, [u8]>, String> {
     let length = buffer.byte_length;
     if before.saturating_add(length) > MAX_BYTES {
-        return Err(format!("`byteLength` is {length}: all buffers together exceed {MAX_BYTES} bytes"));
+        return Err(format!(
+            "`byteLength` is {length}: all buffers together exceed {MAX_BYTES} bytes"
+        ));
     }
     let mut bytes: Cow<'a, [u8]> = match buffer.uri.as_deref() {
-        None if number == 0 => binary.ok_or("it has no `uri`, and the file has no binary chunk (GLB)")?.into(),
+        None if number == 0 => binary
+            .ok_or("it has no `uri`, and the file has no binary chunk (GLB)")?
+            .into(),
         None => return Err("it has no `uri`; only buffer 0 may be the binary chunk".to_owned()),
         Some(uri) => match uri.strip_prefix("data:") {
             Some(data) => embedded(data)?.into(),
@@ -126,7 +130,8 @@ fn embedded(data: &str) -> Result<Vec<u8>, String> {
 
 /// First bytes of a file in the folder or below it.
 fn beside(uri: &str, folder: Option<&Path>, length: u64) -> Result<Vec<u8>, String> {
-    let folder = folder.ok_or("separate buffer files are not supported here; use GLB or data URIs")?;
+    let folder =
+        folder.ok_or("separate buffer files are not supported here; use GLB or data URIs")?;
     let path = inside(uri).ok_or_else(|| {
         let uri: String = uri.chars().take(80).collect();
         format!("'{uri}' leads out of the folder of the file: put its buffers there or below")

@@ -227,7 +227,9 @@ fn labelled(
 pub(super) fn right_share(found: &SemanticCloud, truth: &SemanticCloud) -> Result<f64, AnyError> {
     if found.points_m != truth.points_m {
         let (found, truth) = (found.points_m.len(), truth.points_m.len());
-        let problem = format!("{found} points with labels of the network, expected the same {truth} as with true labels");
+        let problem = format!(
+            "{found} points with labels of the network, expected the same {truth} as with true labels"
+        );
         return Err(problem.into());
     }
     let pairs = found.labels.iter().zip(&truth.labels);
