@@ -311,12 +311,12 @@ pub struct NavSatFix {
 }
 
 impl NavSatFix {
-    /// Nothing known.
+    /// Unknown covariance.
     pub const COVARIANCE_TYPE_UNKNOWN: u8 = 0;
-    /// Estimated from dilution of precision.
+    /// Covariance estimated from the dilution of precision.
     pub const COVARIANCE_TYPE_APPROXIMATED: u8 = 1;
-    /// Variances known.
+    /// Known variances on the diagonal.
     pub const COVARIANCE_TYPE_DIAGONAL_KNOWN: u8 = 2;
-    /// All known.
+    /// Fully known covariance.
     pub const COVARIANCE_TYPE_KNOWN: u8 = 3;
 }
