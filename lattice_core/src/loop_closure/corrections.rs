@@ -36,8 +36,8 @@ impl Corrections {
         &self.anchors
     }
 
-    /// Begins a submap at the time of its first point; the last scan of the submap before ended at `end_ns`. Until a
-    /// loop is known, it has the pose of the submap before.
+    /// Begins a submap halfway between the end of the last scan of the submap before (`end_ns`) and its first point
+    /// (`begin_ns`); the first submap at `begin_ns`. Until a loop is known, it has the pose of the submap before.
     pub fn begin_submap(&mut self, submap: u32, end_ns: i64, begin_ns: i64) {
         let Some(last) = self.anchors.last().cloned() else {
             self.anchors.push(Anchor {

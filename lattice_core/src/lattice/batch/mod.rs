@@ -131,7 +131,7 @@ impl BatchQuantizer {
 
     /// Writes the lattice index of each point to `indices`, of the same length.
     ///
-    /// Returns the first point without a cell, whose index is invalid.
+    /// Returns the position of the first point without a cell in `points`; the indices of such points are invalid.
     pub fn indices(&self, points: &[[f32; 3]], indices: &mut [LatticeIndex]) -> Option<usize> {
         let (mut bad, mut at, mut rest) = (None, 0, indices);
         self.for_blocks(points, |block, sums| {
