@@ -5,6 +5,7 @@ use rustc_hash::FxHashMap;
 use super::masks::ScanMasks;
 use super::packed::{Packed, difference};
 use super::scan::{self, RayBundle, Reach, ScanReport};
+use super::surface::Surfaces;
 use super::traversal::Traversal;
 use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
@@ -16,7 +17,7 @@ pub struct ClearOptions {
     pub misses: u32,
     /// Range of the rays that clear.
     pub reach: Reach,
-    /// Keeps voxels that touch a cell hit by the scan.
+    /// Keeps voxels that the scan grazes: those that touch a hit cell, and those whose surface no ray passes through.
     pub spare_touching: bool,
     /// Maximum memory for the masks of a scan, bytes; cells beyond it are not cleared.
     pub max_bytes: usize,
@@ -25,7 +26,7 @@ pub struct ClearOptions {
 impl Default for ClearOptions {
     fn default() -> ClearOptions {
         ClearOptions {
-            misses: 1,
+            misses: 2,
             reach: Reach::default(),
             spare_touching: true,
             max_bytes: 1 << 28,
@@ -40,7 +41,7 @@ pub struct ClearReport {
     pub scan: ScanReport,
     /// Number of occupied voxels that rays traversed, except kept ones.
     pub missed: u64,
-    /// Number of occupied voxels that rays traversed, kept because they touch a hit cell.
+    /// Number of occupied voxels that rays traversed, kept because the scan grazes them.
     pub kept: u64,
     /// Removed voxels in ascending order.
     pub removed: Vec<MortonKey>,
@@ -49,14 +50,16 @@ pub struct ClearReport {
 /// Clears voxels of a store that rays traverse, for dynamic scenes.
 ///
 /// A voxel is traversed if a ray to the lattice point of a hit cell crosses it more than [`Reach::keep_m`] before the
-/// end. Voxels that the scan hits are kept. With `spare_touching`, voxels that touch one in at least a vertex are
-/// kept too: a surface at a grazing angle does not clear itself.
+/// end. Voxels that the scan hits are kept. With `spare_touching`, a surface at a grazing angle does not clear itself.
+/// Voxels that touch a hit cell in at least a vertex are kept, and voxels that no ray passes through: the surface is the
+/// plane or line of the means of the touching voxels, and the ray goes to the mean of the voxel that it ends in.
 #[derive(Clone, Debug)]
 pub struct RayClearer {
     traversal: Traversal,
     options: ClearOptions,
     touching: Vec<LatticeIndex>,
     masks: ScanMasks,
+    surfaces: Surfaces,
     missed: FxHashMap<MortonKey, u32>,
 }
 
@@ -67,7 +70,8 @@ impl RayClearer {
             traversal: Traversal::new(lattice),
             options,
             touching: lattice.touching_neighbors().to_vec(),
-            masks: ScanMasks::new(options.max_bytes / ScanMasks::BYTES_PER_BLOCK),
+            masks: ScanMasks::new(options.max_bytes / 2 / ScanMasks::BYTES_PER_BLOCK),
+            surfaces: Surfaces::new(options.max_bytes / 2),
             missed: FxHashMap::default(),
         }
     }
@@ -87,22 +91,23 @@ impl RayClearer {
         }
         let reach = self.options.reach;
         let datum_m = store.datum_m();
-        report.scan = scan::mark(&self.traversal, &mut self.masks, &datum_m, scan, reach);
-        self.forget_hits(store);
-        let mut keys: Vec<MortonKey> = Vec::new();
+        let (masks, traversal) = (&mut self.masks, &self.traversal);
+        let (counts, rays) = scan::mark(traversal, masks, &datum_m, scan, reach);
+        report.scan = counts;
+        let mut traversed: Vec<Packed> = Vec::new();
         for (block, passed, hit) in self.masks.blocks() {
-            for place in passed.without(hit).places() {
-                let cell = Packed::at(block, place);
-                let Some(key) = cell.key().filter(|key| store.contains(*key)) else {
-                    continue;
-                };
-                if self.options.spare_touching && self.touches_hit(cell) {
-                    report.kept += 1;
-                } else {
-                    keys.push(key);
-                }
-            }
+            let missed = passed.without(hit);
+            let cells = missed.places().map(|place| Packed::at(block, place));
+            traversed.extend(cells.filter(|cell| store.holds(cell.unpack())));
         }
+        let occupied = traversed.len();
+        if self.options.spare_touching {
+            traversed.retain(|cell| !self.touches_hit(*cell));
+            traversed = (self.surfaces).passed_through(store, &self.touching, &rays, traversed);
+        }
+        report.kept = (occupied - traversed.len()) as u64;
+        self.forget_hits(store);
+        let mut keys: Vec<MortonKey> = traversed.iter().filter_map(|cell| cell.key()).collect();
         keys.sort_unstable();
         report.missed = keys.len() as u64;
         keys.retain(|key| self.is_enough(*key) && store.remove(*key));

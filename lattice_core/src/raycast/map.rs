@@ -108,7 +108,7 @@ impl FreeSpaceMap {
     /// The result does not depend on the order of the points of a bundle. Points that are not finite or out of range
     /// are counted and dropped; if the origin is, the whole bundle.
     pub fn insert_scan(&mut self, scan: &[RayBundle]) -> ScanReport {
-        let mut report = scan::mark(
+        let (mut report, _) = scan::mark(
             &self.traversal,
             &mut self.masks,
             &self.datum_m,

@@ -159,6 +159,20 @@ impl ScanMasks {
         mask.is_some_and(|mask| mask.0[place >> 6 & 7] >> (place & 63) & 1 == 1)
     }
 
+    /// As [`ScanMasks::is_hit`], without a look-up for cells in the block of the last one.
+    #[inline(always)]
+    pub(super) fn is_hit_from(&self, cell: Packed, cursor: &mut Cursor) -> bool {
+        if cell.block() != cursor.block {
+            *cursor = Cursor {
+                block: cell.block(),
+                slot: self.find(cell.block()).unwrap_or(0),
+            };
+        }
+        let place = cell.place();
+        let mask = self.hit.get(cursor.slot).filter(|_| cursor.slot != 0);
+        mask.is_some_and(|mask| mask.0[place >> 6 & 7] >> (place & 63) & 1 == 1)
+    }
+
     fn find(&self, block: u64) -> Option<usize> {
         let mask = self.table.len() - 1;
         let mut at = spread(block, self.multiplier, self.bits);

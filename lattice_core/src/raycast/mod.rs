@@ -13,6 +13,7 @@ mod map;
 mod masks;
 mod packed;
 mod scan;
+mod surface;
 mod traversal;
 
 pub use clear::{ClearOptions, ClearReport, RayClearer};

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use rustc_hash::FxHashSet;
 
-use super::families::{Families, Ray};
+use super::families::{Families, Origin, Ray};
 use super::masks::{Cursor, ScanMasks};
 use super::packed::Packed;
 use super::traversal::{Kernel, Outside, Traversal};
@@ -82,13 +82,13 @@ pub(super) struct Ends {
 ///
 /// Rays go to the lattice points of their end cells, so the marks do not depend on the order of the points of a
 /// bundle. A cell hit by several bundles has a ray of the first.
-pub(super) fn mark(
-    traversal: &Traversal,
+pub(super) fn mark<'a>(
+    traversal: &'a Traversal,
     masks: &mut ScanMasks,
     datum_m: &Vector3<f64>,
-    scan: &[RayBundle],
+    scan: &[RayBundle<'a>],
     reach: Reach,
-) -> ScanReport {
+) -> (ScanReport, MarkedRays<'a>) {
     masks.clear();
     let mut report = ScanReport::default();
     let mut bundles = Vec::with_capacity(scan.len());
@@ -109,11 +109,44 @@ pub(super) fn mark(
             }),
         }
     }
-    mark_bundles(&bundles, masks, &mut report);
-    report
+    let ends = mark_bundles(&bundles, masks, &mut report);
+    let bundles = bundles.into_iter().zip(ends).collect();
+    (report, MarkedRays { bundles })
 }
 
-fn mark_bundles(bundles: &[Rays], masks: &mut ScanMasks, report: &mut ScanReport) {
+/// Rays of a marked scan.
+pub(super) struct MarkedRays<'a> {
+    bundles: Vec<(Rays<'a>, Ends)>,
+}
+
+/// Straight line from a sensor, metres from lattice point 0.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line {
+    pub(super) origin_m: Vector3<f64>,
+    /// Unit vector.
+    pub(super) direction: Vector3<f64>,
+}
+
+impl MarkedRays<'_> {
+    /// Visits the cells of `wanted` that rays traverse, with the line to the point `end_m` of their end cell, metres from
+    /// lattice point 0; to its lattice point where that is `None`.
+    pub(super) fn visit(
+        &self,
+        wanted: &ScanMasks,
+        end_m: impl Fn(Packed) -> Option<Vector3<f64>>,
+        mut visit: impl FnMut(&Line, Packed),
+    ) {
+        for (rays, ends) in &self.bundles {
+            match &rays.traversal.kernel {
+                Kernel::Four(families) => rays.visit(families, ends, wanted, &end_m, &mut visit),
+                Kernel::Six(families) => rays.visit(families, ends, wanted, &end_m, &mut visit),
+                Kernel::Eight(families) => rays.visit(families, ends, wanted, &end_m, &mut visit),
+            }
+        }
+    }
+}
+
+fn mark_bundles(bundles: &[Rays], masks: &mut ScanMasks, report: &mut ScanReport) -> Vec<Ends> {
     let ends = |rays: &Rays| rays.ends(masks, report);
     let mut ends: Vec<Ends> = bundles.iter().map(ends).collect();
     for ends in &mut ends {
@@ -139,6 +172,7 @@ fn mark_bundles(bundles: &[Rays], masks: &mut ScanMasks, report: &mut ScanReport
     report.hits = ends.iter().map(|ends| ends.hits.len() as u64).sum();
     report.rays = report.hits + ends.iter().map(|ends| ends.open.len() as u64).sum::<u64>();
     report.entries_refused = masks.entries_refused();
+    ends
 }
 
 /// Rays of one bundle, in metres from lattice point 0.
@@ -233,6 +267,69 @@ impl Rays<'_> {
         }
     }
 
+    /// Visits the cells of `wanted` on the rays, see [`MarkedRays::visit`].
+    fn visit<const P: usize>(
+        &self,
+        families: &Families<P>,
+        ends: &Ends,
+        wanted: &ScanMasks,
+        end_m: &impl Fn(Packed) -> Option<Vector3<f64>>,
+        visit: &mut impl FnMut(&Line, Packed),
+    ) {
+        let origin = self.start(families);
+        let (mut cursor, mut traversed) = (Cursor::NONE, Vec::new());
+        for end in ends.hits.iter().chain(&ends.open) {
+            let Some(mut ray) = self.ray(families, &origin, *end) else {
+                continue;
+            };
+            traversed.clear();
+            while families.step(&origin, &mut ray, |cell| {
+                if wanted.is_hit_from(cell, &mut cursor) {
+                    traversed.push(cell);
+                }
+            }) {}
+            if traversed.is_empty() {
+                continue;
+            }
+            let center = || self.traversal.lattice.center(end.unpack());
+            let to_end = end_m(*end).unwrap_or_else(center) - self.origin_m;
+            let line = Line {
+                origin_m: self.origin_m,
+                direction: to_end.normalize(),
+            };
+            traversed.iter().for_each(|cell| visit(&line, *cell));
+        }
+    }
+
+    fn start<const P: usize>(&self, families: &Families<P>) -> Origin<P> {
+        let center = self.traversal.lattice.center(self.start.unpack());
+        families.origin(self.origin_m - center, self.start)
+    }
+
+    /// Ray to the lattice point of an end, without its last part; `None` if nothing is left.
+    #[inline(always)]
+    fn ray<const P: usize>(
+        &self,
+        families: &Families<P>,
+        origin: &Origin<P>,
+        end: Packed,
+    ) -> Option<Ray<P>> {
+        let mut ray = self.traversal.lattice.center(end.unpack()) - self.origin_m;
+        let length = ray.norm();
+        let keep_m = self.reach.keep_m.max(self.reach.keep_ratio * length);
+        if keep_m > 0.0 {
+            if length <= keep_m {
+                return None;
+            }
+            ray *= 1.0 - keep_m / length;
+        }
+        Some(Ray {
+            walk: families.walk(origin, &ray),
+            steps: 0,
+            limit: self.traversal.most_steps(length),
+        })
+    }
+
     /// Marks the cells from the origin to each end, without the end.
     #[inline(always)]
     fn follow<const P: usize>(
@@ -241,26 +338,9 @@ impl Rays<'_> {
         masks: &mut ScanMasks,
         ends: &Ends,
     ) -> u64 {
-        let lattice = &self.traversal.lattice;
-        let from_center = self.origin_m - lattice.center(self.start.unpack());
-        let origin = families.origin(from_center, self.start);
+        let origin = self.start(families);
         let ends = ends.hits.iter().chain(&ends.open);
-        let mut rays = ends.filter_map(|end| {
-            let mut ray = lattice.center(end.unpack()) - self.origin_m;
-            let length = ray.norm();
-            let keep_m = self.reach.keep_m.max(self.reach.keep_ratio * length);
-            if keep_m > 0.0 {
-                if length <= keep_m {
-                    return None;
-                }
-                ray *= 1.0 - keep_m / length;
-            }
-            Some(Ray {
-                walk: families.walk(&origin, &ray),
-                steps: 0,
-                limit: self.traversal.most_steps(length),
-            })
-        });
+        let mut rays = ends.filter_map(|end| self.ray(families, &origin, *end));
         let mut visits = 0;
         let mut lanes: Vec<(Ray<P>, Cursor)> = rays
             .by_ref()

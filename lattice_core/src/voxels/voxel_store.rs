@@ -57,6 +57,12 @@ pub trait VoxelStore: Sync {
         self.datum_m() + self.lattice().center(key.unpack())
     }
 
+    /// Mean of the points of a voxel, map frame, metres: the centre of its cell where means are not kept; `None` if the
+    /// cell is not occupied.
+    fn mean_m(&self, key: MortonKey) -> Option<Vector3<f64>> {
+        self.contains(key).then(|| self.center_m(key))
+    }
+
     /// Cell of a point (map frame, metres); `None` if not finite or out of the range of keys.
     fn key_of(&self, point_m: &Vector3<f64>) -> Option<MortonKey> {
         let w = self.lattice().quantize(&(point_m - self.datum_m()))?;

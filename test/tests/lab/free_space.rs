@@ -1,15 +1,21 @@
-//! Free space on a log with a person: the person goes from the map, the yard stays.
+//! Free space on logs with persons and cars: they go from the map, all that stands stays.
 
 use lattice_bag::{BagReader, Storage};
-use lattice_core::lattice::MortonKey;
+use lattice_core::cloud::Cloud;
+use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
+use lattice_core::raycast::{ClearOptions, RayBundle, RayClearer, Reach};
+use lattice_core::voxels::{VoxelList, VoxelStore};
 use lattice_lab::datasets::{BobcatOptions, write_bobcat};
+use lattice_lab::simulate::drive::Drive;
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_runtime::params::Params;
 use lattice_runtime::ros_args::RosArgs;
-use std::collections::BTreeSet;
+use lattice_test::data::shared;
+use nalgebra::Vector3;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The person is gone after half of it.
@@ -107,5 +113,154 @@ fn a_person_goes_from_the_map_and_the_yard_stays() {
             100.0 * left,
             100.0 * lost
         );
+    }
+}
+
+/// Points of one scan, by the position of the sensor, in the map frame, metres.
+type Scan = Vec<(Vector3<f64>, Vec<Vector3<f64>>)>;
+
+/// The first 15 s of a drive, with a position of the sensor every 10 ms.
+fn driven(drive: &Drive) -> Vec<Scan> {
+    const STEP_NS: i64 = 10_000_000;
+    let scan = |number| {
+        let scan = drive.scan(number);
+        let mut bundles: BTreeMap<i64, Vec<Vector3<f64>>> = BTreeMap::new();
+        for (point_m, time_ns) in scan.points_m.iter().zip(&scan.times_ns) {
+            let pose = drive.pose(*time_ns);
+            let point_m = pose.rotation * point_m + pose.translation.vector;
+            bundles.entry(time_ns / STEP_NS).or_default().push(point_m);
+        }
+        let origin = |step: i64| drive.pose(step * STEP_NS + STEP_NS / 2).translation.vector;
+        bundles
+            .into_iter()
+            .map(|(step, points)| (origin(step), points))
+            .collect()
+    };
+    drive.scans().take(150).map(scan).collect()
+}
+
+fn cloud(points_m: &[Vector3<f64>]) -> Cloud {
+    Cloud::from_points(0, Vector3::zeros(), points_m)
+}
+
+/// Voxels of all scans, and those that are left where rays clear.
+fn cleared(scans: &[Scan], cell_volume_m3: f64, options: ClearOptions) -> [VoxelList; 2] {
+    let lattice = Lattice::new(LatticeKind::Fcc, cell_volume_m3).unwrap();
+    let [mut all, mut left] =
+        [0; 2].map(|_| VoxelList::new(lattice.clone(), Vector3::zeros(), usize::MAX).unwrap());
+    let mut clearer = RayClearer::new(&lattice, options);
+    for scan in scans {
+        let clouds: Vec<(Vector3<f64>, Cloud)> = scan
+            .iter()
+            .map(|(origin, points)| (*origin, cloud(points)))
+            .collect();
+        for (_, cloud) in &clouds {
+            all.insert(cloud);
+            left.insert(cloud);
+        }
+        let bundles: Vec<RayBundle> = (clouds.iter())
+            .map(|(origin_m, ends)| RayBundle {
+                origin_m: *origin_m,
+                ends,
+            })
+            .collect();
+        clearer.clear(&mut left, &bundles);
+    }
+    [all, left]
+}
+
+/// Number of scans that have points in each cell.
+fn scans_of_cells(scans: &[Scan], store: &dyn VoxelStore) -> BTreeMap<MortonKey, usize> {
+    let mut counts = BTreeMap::new();
+    for scan in scans {
+        let points = scan.iter().flat_map(|(_, points)| points);
+        let cells: BTreeSet<MortonKey> = points.filter_map(|p| store.key_of(p)).collect();
+        for cell in cells {
+            *counts.entry(cell).or_default() += 1;
+        }
+    }
+    counts
+}
+
+/// Options and their names: the defaults, and rays that clear whatever they cross.
+fn rules() -> [(&'static str, ClearOptions); 3] {
+    let crossing = ClearOptions {
+        misses: 1,
+        spare_touching: false,
+        ..ClearOptions::default()
+    };
+    let shortened = ClearOptions {
+        reach: Reach {
+            keep_ratio: 0.3,
+            ..Reach::default()
+        },
+        ..crossing
+    };
+    [
+        ("default", ClearOptions::default()),
+        ("keep_ratio 0.3", shortened),
+        ("all that is crossed", crossing),
+    ]
+}
+
+fn percent(part: usize, all: usize) -> f64 {
+    100.0 * part as f64 / all.max(1) as f64
+}
+
+/// Streets with passing cars and persons, against the same scans without them.
+#[test]
+fn passers_go_from_the_map_of_a_town_and_the_town_stays() {
+    for (seed, cell_volume_m3) in [(1, 0.125), (2, 0.125), (1, 0.008)] {
+        let [passers, still] = Drive::passers(seed).map(|drive| driven(&drive));
+        for (name, options) in rules() {
+            let [all, left] = cleared(&passers, cell_volume_m3, options);
+            let fixed = scans_of_cells(&still, &all);
+            let seen_twice: Vec<_> = fixed.iter().filter(|(_, scans)| **scans > 1).collect();
+            let lost = seen_twice
+                .iter()
+                .filter(|(key, _)| !left.contains(**key))
+                .count();
+            // Not those who are there at the end.
+            let end = scans_of_cells(&passers[passers.len() - 1..], &all);
+            let passed: Vec<MortonKey> = (all.sorted_keys().into_iter())
+                .filter(|key| !fixed.contains_key(key) && !end.contains_key(key))
+                .collect();
+            let removed = passed.iter().filter(|key| !left.contains(**key)).count();
+            let lost = percent(lost, seen_twice.len());
+            let removed = percent(removed, passed.len());
+            println!(
+                "town {seed}, {cell_volume_m3} m^3, {name}: {lost:.2} % of {} lost, {removed:.1} % of {} removed",
+                seen_twice.len(),
+                passed.len()
+            );
+            assert!(seen_twice.len() > 20_000 && passed.len() > 1000);
+            assert!(name != "default" || (lost < 2.0 && removed > 85.0));
+        }
+    }
+}
+
+/// Real scans of a street, which lose next to nothing by the default parameters.
+#[test]
+fn a_street_stays_in_the_map_of_kitti() {
+    let Some(bag) = shared("kitti00/bag_mcap") else {
+        return;
+    };
+    for volume in ["cell_volume_m3:=0.125", "cell_volume_m3:=0.008"] {
+        let clear = [volume, "free_space:=clear"];
+        let crossed = [
+            &clear[..],
+            &["rays.misses:=1", "rays.spare_touching:=false"],
+        ]
+        .concat();
+        let shortened = [&crossed[..], &["rays.keep_ratio:=0.3"]].concat();
+        let evidence = [volume, "free_space:=evidence"];
+        let maps = maps(&bag, &[&[volume], &clear, &shortened, &crossed, &evidence]);
+        let (all, cleared) = maps.split_first().unwrap();
+        let lost: Vec<f64> = cleared
+            .iter()
+            .map(|left| percent(all.len() - left.len(), all.len()))
+            .collect();
+        println!("kitti, {volume}: of {} lost {lost:.2?} %", all.len());
+        assert!(all.len() > 20_000 && lost[0] < 1.0 && lost[2] > 5.0);
     }
 }

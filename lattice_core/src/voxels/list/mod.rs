@@ -321,6 +321,11 @@ impl VoxelStore for VoxelList {
         VoxelList::contains(self, key)
     }
 
+    fn mean_m(&self, key: MortonKey) -> Option<Vector3<f64>> {
+        let voxel = self.get(key)?;
+        Some(self.center_m(key) + Vector3::from(voxel.mean_offset_m()))
+    }
+
     #[inline]
     fn holds(&self, w: LatticeIndex) -> bool {
         let code = BlockKey::pack(w);

@@ -24,18 +24,20 @@ fn bundle(origin_m: Vector3<f64>, ends: &Cloud) -> RayBundle<'_> {
     RayBundle { origin_m, ends }
 }
 
-/// Clears along the rays of one scan.
+/// Clears what the rays of one scan cross, or with `spare_touching` what they pass through.
 fn clear_rays(
     store: &mut VoxelList,
     origin_m: Vector3<f64>,
     ends: &Cloud,
-    keep_m: f64,
+    (keep_m, spare_touching): (f64, bool),
 ) -> ClearReport {
     let options = ClearOptions {
+        misses: 1,
         reach: Reach {
             keep_m,
             ..Reach::default()
         },
+        spare_touching,
         ..ClearOptions::default()
     };
     let mut clearer = RayClearer::new(&store.lattice().clone(), options);
@@ -74,7 +76,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_removed_is_what_rays_cross_away_from_hits(
+    fn what_is_removed_is_what_rays_cross_and_less_of_what_they_graze(
         kind in any_kind(),
         (stored, mut scan) in (any_points(800), any_points(40)),
     ) {
@@ -88,7 +90,7 @@ proptest! {
             .points_m()
             .map(|p| store.key_of(&p).unwrap())
             .collect();
-        let touches = |key: &MortonKey| {
+        let is_touched = |key: &MortonKey| {
             let w = key.unpack();
             let mut around = lattice.touching_neighbors().iter().chain(&[[0; 3]]);
             around.any(|n| {
@@ -101,15 +103,19 @@ proptest! {
             let cells = crossed(&lattice, &from, &lattice.center(end.unpack()));
             expected.extend(cells.into_iter().map(|w| MortonKey::pack(w).unwrap()));
         }
-        expected.retain(|key| before.contains(key) && !touches(key));
-        let mut again = list(kind, &stored);
-        let report = clear_rays(&mut store, origin_m, &cloud(scan.clone()), 0.0);
+        expected.retain(|key| before.contains(key) && !ends.contains(key));
+        let report = clear_rays(&mut store, origin_m, &cloud(scan.clone()), (0.0, false));
         prop_assert_eq!(&report.removed, &expected.iter().copied().collect::<Vec<_>>());
         prop_assert_eq!(report.missed as usize, expected.len());
         let left: Vec<MortonKey> = before.difference(&expected).copied().collect();
         prop_assert_eq!(store.sorted_keys(), left);
+        let [mut spared, mut again] = [0; 2].map(|_| list(kind, &stored));
+        let report = clear_rays(&mut spared, origin_m, &cloud(scan.clone()), (0.0, true));
+        let removed: BTreeSet<MortonKey> = report.removed.iter().copied().collect();
+        prop_assert!(removed.is_subset(&expected) && !removed.iter().any(is_touched));
+        prop_assert_eq!((report.missed + report.kept) as usize, expected.len());
         scan.reverse();
-        prop_assert_eq!(report, clear_rays(&mut again, origin_m, &cloud(scan), 0.0));
+        prop_assert_eq!(report, clear_rays(&mut again, origin_m, &cloud(scan), (0.0, true)));
     }
 }
 
@@ -159,6 +165,7 @@ fn a_hit_between_starts_the_count_of_misses_anew() {
     };
     let options = ClearOptions {
         misses: 2,
+        spare_touching: false,
         ..ClearOptions::default()
     };
     let mut clearer = RayClearer::new(&store.lattice().clone(), options);
@@ -182,7 +189,7 @@ fn the_last_part_of_a_ray_clears_nothing() {
             ..cloud(vec![[0.0; 3]])
         };
         let origin = center - Vector3::x() * 4.0;
-        let report = clear_rays(&mut store, origin, &scan, keep_m);
+        let report = clear_rays(&mut store, origin, &scan, (keep_m, true));
         assert_eq!(report.removed.len(), removed, "{keep_m}");
     }
 }

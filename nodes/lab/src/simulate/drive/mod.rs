@@ -123,6 +123,12 @@ impl Drive {
         scenes::drive(scene, seed)
     }
 
+    /// Creates the drive through the town with persons who walk by, and the same drive without anything that moves:
+    /// what both hit has the same points.
+    pub fn passers(seed: u64) -> [Drive; 2] {
+        scenes::passers(seed)
+    }
+
     /// Numbers of the scans, in order of time.
     pub fn scans(&self) -> impl Iterator<Item = i64> + '_ {
         let count = (self.route.duration_s() * 1e9) as i64 / TURN_NS;

@@ -193,6 +193,26 @@ fn town(random: &mut Stream) -> Drive {
     }
 }
 
+/// The town with three persons, and without them and the moving cars.
+pub(super) fn passers(seed: u64) -> [Drive; 2] {
+    let still = || Drive {
+        moving: Vec::new(),
+        ..drive(DriveScene::Town, seed)
+    };
+    let mut passers = drive(DriveScene::Town, seed);
+    let walk = |x: f64, y: f64, velocity: [f64; 2]| Moving {
+        solid: pillar(x, y, 0.25, 1.75),
+        velocity: Vector3::new(velocity[0], velocity[1], 0.0),
+    };
+    // Over the street ahead, along the houses with the lidar, and towards it on the other side.
+    passers.moving.extend([
+        walk(62.0, -58.0, [0.0, 1.3]),
+        walk(8.0, -43.0, [1.3, 0.0]),
+        walk(45.0, -57.0, [-1.3, 0.0]),
+    ]);
+    [passers, still()]
+}
+
 fn indoor(random: &mut Stream) -> Drive {
     let (half_m, corner_m) = ([11.0, 7.0], 1.5);
     let [x, y] = half_m.map(|half| half + 3.0);
