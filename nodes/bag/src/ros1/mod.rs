@@ -6,6 +6,7 @@ mod contents;
 mod definition;
 mod index;
 mod record;
+mod ros2_text;
 mod scan;
 mod stream;
 #[cfg(test)]
@@ -22,8 +23,8 @@ use tempfile::TempPath;
 
 use super::BagError;
 use super::storage::{Filter, StorageInfo, StorageStream};
-pub(crate) use contents::{is_true, topic};
 use contents::{Contents, Routes};
+pub(crate) use contents::{is_true, topic};
 pub(crate) use definition::ros2_name;
 use record::MAGIC;
 use stream::Ros1Stream;
@@ -121,7 +122,15 @@ impl Ros1File {
                 ..Contents::default()
             };
             let lengths = (self.size, self.index_pos);
-            scan::scan(&mut file, &self.path, lengths, known)
+            let mut scanned = scan::scan(&mut file, &self.path, lengths, known);
+            let (found, claimed) = (scanned.messages(), self.claimed.unwrap_or(0));
+            if scanned.damages.is_empty() && found != claimed {
+                let reason = format!("it counts {claimed} messages, the chunks have {found}");
+                let remedy = "the messages of the chunks are read";
+                let wrong = BagError::corrupt(&self.path, "its index", reason, remedy);
+                scanned.damages.push((wrong, false));
+            }
+            scanned
         });
         let contents = scanned.as_ref().unwrap_or(&self.contents);
         let source = (file, self.path.clone(), self.size);
