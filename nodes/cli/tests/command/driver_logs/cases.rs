@@ -82,6 +82,7 @@ pub fn ros1() -> Vec<Case> {
         stored("ros1_lz4_active", "clearpath_tf_alone"),
         stored("ros1_bz2", "novatel_inspvax"),
         stored("ros1_lz4", "motion_capture"),
+        stored("ros1", "gps_1_hz_imu_100_hz"),
     ]
 }
 
