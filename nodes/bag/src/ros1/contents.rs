@@ -39,6 +39,17 @@ pub(super) struct Block {
     pub behind: bool,
 }
 
+impl Connection {
+    /// True if nothing in its record is obviously damaged.
+    pub(super) fn is_plausible(&self) -> bool {
+        let TopicInfo {
+            name, type_name, ..
+        } = &self.topic;
+        let is_graphic = |text: &str| text.bytes().all(|b| b.is_ascii_graphic());
+        self.transcoder.is_ok() && is_graphic(name) && type_name.split('/').count() == 3
+    }
+}
+
 /// Connections, blocks and counts.
 #[derive(Default)]
 pub(super) struct Contents {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 
-use super::contents::{Block, Contents};
+use super::contents::{Block, Connection, Contents};
 use super::record::{Head, MAGIC, RecordError, op};
 
 /// First record of a bag.
@@ -85,6 +85,10 @@ pub(super) fn read_index(
     let known = |id: &u32| contents.connections.contains_key(id);
     if !contents.counts.keys().all(known) {
         return Err("its index counts messages of unknown connections".to_owned());
+    }
+    // The chunks repeat the connections.
+    if !contents.connections.values().all(Connection::is_plausible) {
+        return Err("its index has a connection that cannot be read".to_owned());
     }
     contents.blocks.sort_by_key(|block| block.offset);
     let is_same = |pair: &[Block]| match pair {
