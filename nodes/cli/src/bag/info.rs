@@ -123,7 +123,7 @@ impl Summary {
     fn print(&self) {
         let files = if self.files == 1 { "file" } else { "files" };
         let (number, bytes) = (self.files, megabytes(self.bytes));
-        let storage = match self.is_ros1 {
+        let storage = match self.is_ros1 && self.storage != "rosbag1" {
             true => format!("{} of ROS 1", self.storage),
             false => self.storage.to_owned(),
         };

@@ -19,7 +19,7 @@ fn a_cut_bag_yields_what_precedes_the_cut() {
                 // Without an index a bag may end behind any record.
                 let is_silent = error.is_none() && some.len() < all.len();
                 assert!(!is_silent || !has_index, "{compression} cut at {cut}");
-                assert!(cut > 2000 || cut < 13 || error.is_some() || !has_index);
+                assert!(!(13..=2000).contains(&cut) || error.is_some() || !has_index);
             }
         }
     }
@@ -93,7 +93,7 @@ proptest! {
             let Recovered { messages, damages, lost, .. } = &recovered;
             prop_assert!(*damages > 0 || *lost == Some(0) && *messages == u64::from(COUNT));
             // A damage of at most 256 bytes is in few chunks, unless it is in a connection.
-            let in_connection = at < 0.15 || at > 0.8;
+            let in_connection = !(0.15..=0.8).contains(&at);
             prop_assert!(*messages >= u64::from(COUNT) - 30 || in_connection,
                 "{messages} of {COUNT}");
         }
