@@ -56,7 +56,7 @@ pub(super) struct Contents {
     pub connections: BTreeMap<u32, Connection>,
     pub blocks: Vec<Block>,
     pub counts: BTreeMap<u32, u64>,
-    /// Damages in the order of the file; true: reading the blocks finds it, too.
+    /// Damages in the order of the file, each with true if a block contains it.
     pub damages: Vec<(BagError, bool)>,
 }
 

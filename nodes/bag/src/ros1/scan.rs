@@ -129,7 +129,7 @@ impl Scan {
         }
     }
 
-    /// Notes a damage; returns where to go on.
+    /// Notes a damage; returns the byte from which records follow.
     fn go_on(
         &mut self,
         file: &mut File,
