@@ -258,7 +258,7 @@ impl Neighbors {
         self.len
     }
 
-    /// Tests whether none was found.
+    /// Tests whether no neighbour was found.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }

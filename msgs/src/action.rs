@@ -47,16 +47,16 @@ pub struct CalibrateSendGoal;
 /// Request of [`CalibrateSendGoal`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CalibrateSendGoalRequest {
-    /// Chosen by the client.
+    /// Goal id, chosen by the client.
     pub goal_id: UUID,
-    /// The goal itself.
+    /// Goal itself.
     pub goal: CalibrateGoal,
 }
 
 /// Response of [`CalibrateSendGoal`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CalibrateSendGoalResponse {
-    /// True if the server takes the goal.
+    /// True if the server accepts the goal.
     pub accepted: bool,
     /// Time of the decision.
     pub stamp: Time,
@@ -69,14 +69,14 @@ pub struct CalibrateGetResult;
 /// Request of [`CalibrateGetResult`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CalibrateGetResultRequest {
-    /// Number of the goal.
+    /// Id of the goal.
     pub goal_id: UUID,
 }
 
 /// Response of [`CalibrateGetResult`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CalibrateGetResultResponse {
-    /// One of `action_msgs/msg/GoalStatus`.
+    /// Status of the goal, one of `action_msgs/msg/GoalStatus`.
     pub status: i8,
     /// Outcome of the goal.
     pub result: CalibrateResult,
@@ -85,7 +85,7 @@ pub struct CalibrateGetResultResponse {
 /// The message of `_action/feedback` of [`CalibrateAction`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CalibrateFeedbackMessage {
-    /// Number of the goal.
+    /// Id of the goal.
     pub goal_id: UUID,
     /// Progress of the goal.
     pub feedback: CalibrateFeedback,

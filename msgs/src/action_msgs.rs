@@ -41,7 +41,7 @@ impl GoalStatus {
     pub const STATUS_UNKNOWN: i8 = 0;
     /// Waiting.
     pub const STATUS_ACCEPTED: i8 = 1;
-    /// In progress.
+    /// Goal in progress.
     pub const STATUS_EXECUTING: i8 = 2;
     /// Cancellation in progress.
     pub const STATUS_CANCELING: i8 = 3;

@@ -28,7 +28,7 @@ pub struct CalibrationResult {
     pub header: Header,
     /// Frame of the headset's clouds, its origin.
     pub child_frame_id: String,
-    /// Of the headset: another one means another origin.
+    /// Session of the headset: another session means another origin.
     pub session: String,
     /// One of the constants.
     pub verdict: u8,
@@ -36,8 +36,8 @@ pub struct CalibrationResult {
     pub reason: String,
     /// `map_from_headset_origin`, x forward, y left, z up; the best found if not OK.
     pub transform: Transform,
-    /// Of the transform: 6x6 row-major over x, y, z (m) and rotations about the fixed axes X, Y, Z of
-    /// the map (rad).
+    /// Covariance of the transform, 6 x 6, row-major: x, y, z (m) and rotations about the fixed axes X, Y, Z of the
+    /// map (rad).
     #[serde(with = "BigArray")]
     pub covariance: [f64; 36],
     /// Log-likelihood above that of the best different pose.
@@ -119,7 +119,7 @@ impl WeakDirection {
 /// Reliability of the labels of one class of the headset.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ClassReliability {
-    /// As the headset numbers it.
+    /// Number of the class in the headset.
     pub class_id: u16,
     /// Share of its points on the map that have the same class there, 0 to 1.
     pub agreement: f64,

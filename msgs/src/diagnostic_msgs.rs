@@ -15,9 +15,9 @@ messages! {
 /// One value to show.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KeyValue {
-    /// Its label.
+    /// Label of the value.
     pub key: String,
-    /// Its text.
+    /// Value as text.
     pub value: String,
 }
 

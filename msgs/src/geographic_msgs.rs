@@ -1,4 +1,4 @@
-//! Places on earth.
+//! Geographic positions and poses.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,40 +14,40 @@ messages! {
     GeoPoseStamped [Header, GeoPose];
 }
 
-/// A place on earth, WGS 84.
+/// Geographic position, WGS 84.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GeoPoint {
-    /// In deg, north positive, in [-90, 90].
+    /// Latitude, degrees, north positive, in [-90, 90].
     pub latitude: f64,
-    /// In deg, east positive, in [-180, 180].
+    /// Longitude, degrees, east positive, in [-180, 180].
     pub longitude: f64,
-    /// In m above the ellipsoid, NaN where unknown.
+    /// Height above the ellipsoid, m; NaN if unknown.
     pub altitude: f64,
 }
 
-/// A place on earth with its time.
+/// Geographic position with time and frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GeoPointStamped {
-    /// Time of the place.
+    /// Time of the position, and its frame.
     pub header: Header,
-    /// The place.
+    /// Position.
     pub position: GeoPoint,
 }
 
-/// Place and orientation on earth.
+/// Geographic position and orientation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GeoPose {
-    /// The place.
+    /// Position.
     pub position: GeoPoint,
-    /// In the east-north-up frame at that place.
+    /// Orientation in the east-north-up frame at that position.
     pub orientation: Quaternion,
 }
 
-/// Place and orientation on earth with their time.
+/// Geographic position and orientation with time and frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GeoPoseStamped {
-    /// Time of the pose.
+    /// Time of the pose, and its frame.
     pub header: Header,
-    /// The pose.
+    /// Pose.
     pub pose: GeoPose,
 }

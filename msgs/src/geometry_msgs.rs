@@ -22,40 +22,40 @@ messages! {
     TransformStamped [Header, Transform];
 }
 
-/// A position, m.
+/// Position, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// Along x.
+    /// x coordinate, m.
     pub x: f64,
-    /// Along y.
+    /// y coordinate, m.
     pub y: f64,
-    /// Along z.
+    /// z coordinate, m.
     pub z: f64,
 }
 
-/// A position of single precision, m.
+/// Position in single precision, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Point32 {
-    /// Along x.
+    /// x coordinate, m.
     pub x: f32,
-    /// Along y.
+    /// y coordinate, m.
     pub y: f32,
-    /// Along z.
+    /// z coordinate, m.
     pub z: f32,
 }
 
-/// A free vector; its unit is that of the field it stands in.
+/// Free vector, in the unit of its field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Vector3 {
-    /// Along x.
+    /// x component.
     pub x: f64,
-    /// Along y.
+    /// y component.
     pub y: f64,
-    /// Along z.
+    /// z component.
     pub z: f64,
 }
 
-/// A rotation as a unit quaternion.
+/// Rotation as a unit quaternion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quaternion {
     /// Imaginary part i.
@@ -82,27 +82,27 @@ impl Default for Quaternion {
 /// Position and orientation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// In m.
+    /// Position, m.
     pub position: Point,
-    /// Unit quaternion.
+    /// Orientation as a unit quaternion.
     pub orientation: Quaternion,
 }
 
-/// A pose with its time and reference frame.
+/// Pose with time and reference frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PoseStamped {
-    /// Time, and frame that the pose is given in.
+    /// Time, and reference frame of the pose.
     pub header: Header,
-    /// The pose.
+    /// Pose in the reference frame.
     pub pose: Pose,
 }
 
-/// An uncertain pose.
+/// Pose with covariance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PoseWithCovariance {
-    /// Mean.
+    /// Mean pose.
     pub pose: Pose,
-    /// 6x6 row-major over x, y, z (m) and rotations about the fixed axes X, Y, Z (rad).
+    /// Covariance, 6 x 6, row-major: x, y, z (m) and rotations about the fixed axes X, Y, Z (rad).
     #[serde(with = "BigArray")]
     pub covariance: [f64; 36],
 }
@@ -116,30 +116,30 @@ impl Default for PoseWithCovariance {
     }
 }
 
-/// An uncertain pose with its time and reference frame.
+/// Pose with covariance, time and reference frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PoseWithCovarianceStamped {
-    /// Time, and frame that the pose is given in.
+    /// Time, and reference frame of the pose.
     pub header: Header,
-    /// The pose.
+    /// Pose in the reference frame.
     pub pose: PoseWithCovariance,
 }
 
-/// Velocity in free space.
+/// Linear and angular velocity (twist).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Twist {
-    /// In m/s.
+    /// Linear velocity, m/s.
     pub linear: Vector3,
-    /// In rad/s.
+    /// Angular velocity, rad/s.
     pub angular: Vector3,
 }
 
-/// An uncertain velocity.
+/// Twist with covariance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TwistWithCovariance {
-    /// Mean.
+    /// Mean twist.
     pub twist: Twist,
-    /// 6x6 row-major over linear (m/s) and angular (rad/s) velocity.
+    /// Covariance, 6 x 6, row-major: linear (m/s) and angular (rad/s) velocity.
     #[serde(with = "BigArray")]
     pub covariance: [f64; 36],
 }
@@ -153,22 +153,22 @@ impl Default for TwistWithCovariance {
     }
 }
 
-/// A rigid transform.
+/// Rigid transform.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Transform {
-    /// In m.
+    /// Translation, m.
     pub translation: Vector3,
-    /// Unit quaternion.
+    /// Rotation as a unit quaternion.
     pub rotation: Quaternion,
 }
 
-/// Pose of the child frame in the frame of the header: header.frame_id from child_frame_id.
+/// Transform from the child frame to the frame of the header, as on `/tf`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TransformStamped {
     /// Time, and parent frame.
     pub header: Header,
     /// Child frame.
     pub child_frame_id: String,
-    /// Parent from child.
+    /// `parent_from_child`.
     pub transform: Transform,
 }

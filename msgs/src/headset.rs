@@ -11,27 +11,27 @@ messages! {
     HeadsetMesh [Header, Pose];
 }
 
-/// One surface of a headset's mesh, or one chunk of it, or word that it is gone.
+/// Surface of a headset's mesh, a chunk of one, or its removal.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HeadsetMesh {
     /// Time of this state of the surface, and frame: the origin of the headset.
     pub header: Header,
-    /// Of the headset: another one means another origin, and all surfaces are gone; may be empty.
+    /// Session of the headset: another session means another origin, and removes all surfaces; may be empty.
     pub session: String,
     /// Name of the surface.
     pub surface: String,
-    /// True: the surface is gone, and what follows is left out.
+    /// True if the surface is removed; the fields below are then empty.
     pub removed: bool,
-    /// Number of this chunk, from 0.
+    /// Number of the chunk, from 0.
     pub chunk: u32,
-    /// Chunks of this state of the surface.
+    /// Number of chunks of this state of the surface.
     pub chunks: u32,
     /// `frame_from_surface`, the same in all chunks.
     pub pose: Pose,
-    /// X, y, z of each vertex in the axes of the surface, m.
+    /// Coordinates x, y, z of each vertex in the axes of the surface, m.
     pub vertices: Vec<f32>,
-    /// Three vertices of each triangle.
+    /// Three vertex indices per triangle.
     pub triangles: Vec<u32>,
-    /// Class of each triangle, 65535 if none; empty in all chunks: not known.
+    /// Class of each triangle, 65535 without a class; empty in all chunks if unknown.
     pub classes: Vec<u16>,
 }

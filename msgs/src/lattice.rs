@@ -1,4 +1,4 @@
-//! Messages of Lattice; `msg/LatticeMap.msg` says how keys are written.
+//! Messages of Lattice; `msg/LatticeMap.msg` defines the encoding of the keys.
 
 use serde::{Deserialize, Serialize};
 use serde_bytes::ByteBuf;
@@ -24,110 +24,112 @@ services! {
     PlanPath: PlanPathRequest [Point], PlanPathResponse [Point];
 }
 
-/// Lattice of a map, and its place.
+/// Lattice of a map, and its pose in the map frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LatticeInfo {
-    /// Cubic, bcc, fcc, mcc or hex.
+    /// Name of the lattice: cubic, bcc, fcc, mcc, hex, hexopt or custom.
     pub lattice: String,
     /// Volume of one cell, m³.
     pub cell_volume_m3: f64,
-    /// Row-major 3x3, m; its columns are the basis vectors of the lattice.
+    /// Generator matrix, 3 x 3, row-major, m; its columns are the basis vectors.
     pub generator: [f64; 9],
-    /// Position is the datum of the keys (m), in the frame of the map.
+    /// Pose of the lattice in the map frame; its position is the datum of the keys, m.
     pub map_from_lattice: Pose,
-    /// Point of the earth that the map frame (east-north-up) touches.
+    /// Geodetic origin of the map frame (east-north-up).
     pub origin: GeoPoint,
-    /// False: origin is not known.
+    /// True if the origin is known.
     pub has_origin: bool,
-    /// Changes when the map is reset; sequences count within one epoch.
+    /// Epoch, which changes when the map is reset; sequences count within an epoch.
     pub epoch: u64,
 }
 
-/// A whole voxel map at one sequence number, or one chunk of it.
+/// Keyframe: the whole voxel map at one sequence number, or one chunk of it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LatticeMap {
-    /// Time of the last point, and frame of the map.
+    /// Stamp of the last point, and frame of the map.
     pub header: Header,
-    /// The lattice.
+    /// Lattice of the map.
     pub info: LatticeInfo,
-    /// State of the map that all chunks belong to.
+    /// Sequence number of the state, the same in all chunks.
     pub sequence: u64,
-    /// Number of this chunk, from 0.
+    /// Number of the chunk, from 0.
     pub chunk: u32,
-    /// Chunks of this state.
+    /// Number of chunks of this state.
     pub chunks: u32,
-    /// Voxels in all chunks.
+    /// Number of voxels in all chunks.
     pub voxels_total: u64,
-    /// Encoding of the keys, KEY_ENCODING_*.
+    /// Encoding of the keys, such as `KEY_ENCODING_MORTON21`.
     pub key_encoding: String,
-    /// Voxels in this chunk.
+    /// Number of voxels in this chunk.
     pub voxels: u32,
-    /// Their lattice indices: Morton keys, ascending, as LEB128 differences, the first absolute.
+    /// Lattice indices of the voxels: Morton keys, ascending, as LEB128 differences, the first absolute.
     pub keys: ByteBuf,
-    /// Points in each voxel; empty: not kept.
+    /// Number of points in each voxel; empty if not kept.
     pub counts: Vec<u32>,
-    /// Unit of mean_offsets, m.
+    /// Unit of `mean_offsets`, m.
     pub offset_unit_m: f64,
-    /// X, y, z of (mean point - cell centre) of each voxel, in offset_unit_m; empty: not kept.
+    /// Mean of the points minus cell centre (x, y, z) of each voxel, in `offset_unit_m`; empty if not kept.
     pub mean_offsets: Vec<i16>,
-    /// Most frequent label of each voxel, 65535 if none; empty: not kept.
+    /// Most frequent label of each voxel, 65535 if none; empty if not kept.
     pub labels: Vec<u16>,
-    /// Points with that label in each voxel; empty: not kept.
+    /// Number of points with that label in each voxel; empty if not kept.
     pub label_counts: Vec<u32>,
-    /// Of all updates of the epoch up to the sequence; the text of LatticeMapUpdate says how.
+    /// Checksum of all updates of the epoch up to the sequence, as the text of LatticeMapUpdate defines it.
     pub history_checksum: u64,
 }
 
 impl LatticeMap {
-    /// The only encoding so far.
+    /// Encoding of the full form: ascending Morton keys as LEB128 differences. The thin form of `viewer_server` has
+    /// another.
     pub const KEY_ENCODING_MORTON21: &'static str = "morton21_delta_leb128";
 }
 
-/// The voxels that differ between two states of a map, or one chunk of them.
+/// Update (delta): the voxels that differ between two states of a map, or one chunk of them.
 ///
-/// A voxel that is listed replaces the one the map has.
+/// A listed voxel replaces that of the map.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LatticeMapUpdate {
-    /// Time of the last point, and frame of the map.
+    /// Stamp of the last point, and frame of the map.
     pub header: Header,
-    /// The lattice.
+    /// Lattice of the map.
     pub info: LatticeInfo,
-    /// State to apply this to.
+    /// Sequence number of the state to which the update applies.
     pub previous_sequence: u64,
-    /// State after all chunks are applied.
+    /// Sequence number after all chunks are applied.
     pub sequence: u64,
-    /// Number of this chunk, from 0.
+    /// Number of the chunk, from 0.
     pub chunk: u32,
-    /// Chunks of this update.
+    /// Number of chunks of this update.
     pub chunks: u32,
-    /// Encoding of the keys, KEY_ENCODING_*.
+    /// Encoding of the keys, such as `KEY_ENCODING_MORTON21`.
     pub key_encoding: String,
-    /// Voxels in this chunk.
+    /// Number of changed voxels in this chunk.
     pub voxels: u32,
-    /// Their lattice indices: Morton keys, ascending, as LEB128 differences, the first absolute.
+    /// Lattice indices of the changed voxels: Morton keys, ascending, as LEB128 differences, the first absolute.
     pub keys: ByteBuf,
-    /// Points in each voxel; empty: not kept.
+    /// Number of points in each voxel; empty if not kept.
     pub counts: Vec<u32>,
-    /// Unit of mean_offsets, m.
+    /// Unit of `mean_offsets`, m.
     pub offset_unit_m: f64,
-    /// X, y, z of (mean point - cell centre) of each voxel, in offset_unit_m; empty: not kept.
+    /// Mean of the points minus cell centre (x, y, z) of each voxel, in `offset_unit_m`; empty if not kept.
     pub mean_offsets: Vec<i16>,
-    /// Most frequent label of each voxel, 65535 if none; empty: not kept.
+    /// Most frequent label of each voxel, 65535 if none; empty if not kept.
     pub labels: Vec<u16>,
-    /// Points with that label in each voxel; empty: not kept.
+    /// Number of points with that label in each voxel; empty if not kept.
     pub label_counts: Vec<u32>,
-    /// Voxels that are gone.
+    /// Number of removed voxels.
     pub removed: u32,
-    /// Their keys, written as in keys.
+    /// Lattice indices of the removed voxels, encoded as `keys`.
     pub removed_keys: ByteBuf,
-    /// Voxels of the map after all chunks are applied.
+    /// Number of voxels of the map after all chunks are applied.
     pub voxels_total: u64,
-    /// Of all updates of the epoch, this one included.
+    /// Checksum of all updates of the epoch, this one included.
     pub history_checksum: u64,
 }
 
 impl LatticeMapUpdate {
-    /// The only encoding so far.
+    /// Encoding of the full form: ascending Morton keys as LEB128 differences. The thin form of `viewer_server` has
+    /// another.
     pub const KEY_ENCODING_MORTON21: &'static str = "morton21_delta_leb128";
 }
 
@@ -138,18 +140,18 @@ pub struct SaveMap;
 /// Request of [`SaveMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SaveMapRequest {
-    /// Name below `map_dir`; a map that is there is replaced once the new one is complete.
+    /// File name below `map_dir`; an existing map is replaced once the new one is complete.
     pub path: String,
 }
 
 /// Response of [`SaveMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SaveMapResponse {
-    /// True: done.
+    /// True if the call succeeded.
     pub success: bool,
-    /// Explanation of the outcome.
+    /// Explanation of the result.
     pub message: String,
-    /// Voxels in the file.
+    /// Number of voxels in the file.
     pub voxels: u64,
 }
 
@@ -167,11 +169,11 @@ pub struct LoadMapRequest {
 /// Response of [`LoadMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LoadMapResponse {
-    /// True: done; false: the map is as before.
+    /// True if the map was loaded; otherwise it is unchanged.
     pub success: bool,
-    /// Explanation of the outcome.
+    /// Explanation of the result.
     pub message: String,
-    /// Voxels in the map now.
+    /// Number of voxels of the loaded map.
     pub voxels: u64,
 }
 
@@ -182,81 +184,81 @@ pub struct ClearBox;
 /// Request of [`ClearBox`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ClearBoxRequest {
-    /// Lower corner, m.
+    /// Lower corner in the map frame, m.
     pub min: Point,
-    /// Upper corner, m.
+    /// Upper corner in the map frame, m.
     pub max: Point,
 }
 
 /// Response of [`ClearBox`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ClearBoxResponse {
-    /// True: done.
+    /// True if the call succeeded.
     pub success: bool,
-    /// Explanation of the outcome.
+    /// Explanation of the result.
     pub message: String,
-    /// Voxels that went.
+    /// Number of removed voxels.
     pub removed: u64,
 }
 
-/// Asks what is occupied around a point.
+/// Query of the occupied cells around a point.
 #[derive(Clone, Copy, Debug)]
 pub struct QueryMap;
 
 /// Request of [`QueryMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct QueryMapRequest {
-    /// In the map frame, m.
+    /// Position in the map frame, m.
     pub point: Point,
 }
 
 /// Response of [`QueryMap`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct QueryMapResponse {
-    /// False: not answered, the message says why.
+    /// True if the query was answered; otherwise `message` has the reason.
     pub success: bool,
-    /// Explanation of the outcome.
+    /// Explanation of the result.
     pub message: String,
     /// True if the cell of the point is occupied.
     pub occupied: bool,
-    /// Points in this cell.
+    /// Number of points in this cell; 0 if the map does not count them (`payload: occupancy`).
     pub points: u32,
-    /// False: the map is empty.
+    /// True unless the map is empty.
     pub has_nearest: bool,
-    /// Distance to the nearest occupied cell, 0 inside of one, m.
+    /// Distance from the point to the nearest occupied cell, m; 0 inside it.
     pub clearance_m: f64,
-    /// Centre of the occupied cell that is nearest to the point, m.
+    /// Nearest centre of an occupied cell in the map frame, m.
     pub nearest: Point,
-    /// Distance to this centre, m.
+    /// Distance from the point to this centre, m.
     pub nearest_distance_m: f64,
 }
 
-/// Asks for the shortest path of a ball that touches no occupied cell of the map.
+/// Query of the shortest path of a ball that touches no occupied cell of the map.
 #[derive(Clone, Copy, Debug)]
 pub struct PlanPath;
 
 /// Request of [`PlanPath`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlanPathRequest {
-    /// In the map frame, m.
+    /// Start in the map frame, m.
     pub start: Point,
-    /// In the map frame, m.
+    /// Goal in the map frame, m.
     pub goal: Point,
     /// Radius of the ball, m.
     pub radius_m: f64,
-    /// Distance that an end may move to where the ball fits, m.
+    /// Distance by which start and goal may be moved to a position where the ball fits, m.
     pub tolerance_m: f64,
 }
 
 /// Response of [`PlanPath`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlanPathResponse {
-    /// False: no path, the message says why.
+    /// True if a path was found; otherwise `message` has the reason.
     pub success: bool,
-    /// Explanation of the outcome.
+    /// Explanation of the result.
     pub message: String,
     /// Length of the path, m.
     pub length_m: f64,
-    /// Centres of its cells, from start to goal, in the map frame, m.
+    /// Centres of the cells of the path, from start to goal, in the map frame, m.
     pub path: Vec<Point>,
 }

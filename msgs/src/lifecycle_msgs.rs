@@ -25,7 +25,7 @@ services! {
 pub struct State {
     /// Number of the state; 1 to 4 are unconfigured, inactive, active, finalized.
     pub id: u8,
-    /// Its name.
+    /// Name of the state.
     pub label: String,
 }
 
@@ -40,17 +40,17 @@ impl State {
     pub const PRIMARY_STATE_ACTIVE: u8 = 3;
     /// The node is to be destroyed.
     pub const PRIMARY_STATE_FINALIZED: u8 = 4;
-    /// On the way: configuring.
+    /// Transition state: configuring.
     pub const TRANSITION_STATE_CONFIGURING: u8 = 10;
-    /// On the way: cleaningup.
+    /// Transition state: cleaning up.
     pub const TRANSITION_STATE_CLEANINGUP: u8 = 11;
-    /// On the way: shuttingdown.
+    /// Transition state: shutting down.
     pub const TRANSITION_STATE_SHUTTINGDOWN: u8 = 12;
-    /// On the way: activating.
+    /// Transition state: activating.
     pub const TRANSITION_STATE_ACTIVATING: u8 = 13;
-    /// On the way: deactivating.
+    /// Transition state: deactivating.
     pub const TRANSITION_STATE_DEACTIVATING: u8 = 14;
-    /// On the way: errorprocessing.
+    /// Transition state: processing an error.
     pub const TRANSITION_STATE_ERRORPROCESSING: u8 = 15;
 }
 
@@ -59,12 +59,12 @@ impl State {
 pub struct Transition {
     /// Number of the transition.
     pub id: u8,
-    /// Its name, which takes precedence over the number if given.
+    /// Name of the transition; takes precedence over the number unless empty.
     pub label: String,
 }
 
 impl Transition {
-    /// Create.
+    /// Creates the node.
     pub const TRANSITION_CREATE: u8 = 0;
     /// Acquires resources.
     pub const TRANSITION_CONFIGURE: u8 = 1;
@@ -74,13 +74,13 @@ impl Transition {
     pub const TRANSITION_ACTIVATE: u8 = 3;
     /// Stops operation.
     pub const TRANSITION_DEACTIVATE: u8 = 4;
-    /// Unconfigured shutdown.
+    /// Shuts an unconfigured node down.
     pub const TRANSITION_UNCONFIGURED_SHUTDOWN: u8 = 5;
-    /// Inactive shutdown.
+    /// Shuts an inactive node down.
     pub const TRANSITION_INACTIVE_SHUTDOWN: u8 = 6;
-    /// Active shutdown.
+    /// Shuts an active node down.
     pub const TRANSITION_ACTIVE_SHUTDOWN: u8 = 7;
-    /// Destroy.
+    /// Destroys the node.
     pub const TRANSITION_DESTROY: u8 = 8;
     /// End of configure: success.
     pub const TRANSITION_ON_CONFIGURE_SUCCESS: u8 = 10;
@@ -126,27 +126,27 @@ impl Transition {
     pub const TRANSITION_CALLBACK_ERROR: u8 = 99;
 }
 
-/// A transition with its ends.
+/// Transition with its start and goal states.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TransitionDescription {
     /// The transition.
     pub transition: Transition,
-    /// State before it.
+    /// State before the transition.
     pub start_state: State,
-    /// State after it.
+    /// State after the transition.
     pub goal_state: State,
 }
 
 /// A completed transition.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TransitionEvent {
-    /// Time of it, ns since 1970.
+    /// Time of the transition, ns since 1970.
     pub timestamp: u64,
     /// The transition.
     pub transition: Transition,
-    /// State before it.
+    /// State before the transition.
     pub start_state: State,
-    /// State after it.
+    /// State after the transition.
     pub goal_state: State,
 }
 
@@ -164,7 +164,7 @@ pub struct ChangeStateRequest {
 /// Response of [`ChangeState`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ChangeStateResponse {
-    /// True: the transition succeeded.
+    /// True if the transition succeeded.
     pub success: bool,
 }
 

@@ -21,11 +21,11 @@ macro_rules! livox_messages {
             pub struct CustomPoint {
                 /// Since the stamp, ns.
                 pub offset_time: u32,
-                /// In m.
+                /// x coordinate, m.
                 pub x: f32,
-                /// In m.
+                /// y coordinate, m.
                 pub y: f32,
-                /// In m.
+                /// z coordinate, m.
                 pub z: f32,
                 /// 0 to 255.
                 pub reflectivity: u8,

@@ -15,14 +15,14 @@ messages! {
 pub struct OccupancyGridUpdate {
     /// Frame of the grid.
     pub header: Header,
-    /// First cell along x.
+    /// Column (x index) of the first cell.
     pub x: i32,
-    /// First cell along y.
+    /// Row (y index) of the first cell.
     pub y: i32,
-    /// Cells along x.
+    /// Number of columns (cells along x).
     pub width: u32,
-    /// Cells along y.
+    /// Number of rows (cells along y).
     pub height: u32,
-    /// Values as of the grid, row by row.
+    /// Occupancy values as in the grid, row by row.
     pub data: Vec<i8>,
 }

@@ -20,35 +20,35 @@ messages! {
 /// Layout of the driver for Humble and Jazzy; older drivers end with a uint8 idle_time instead.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Oem7Header {
-    /// Such as INSPVA.
+    /// Name of the message, such as INSPVA.
     pub message_name: String,
-    /// Number of the log.
+    /// Number of the log type.
     pub message_id: u16,
-    /// Source and format bits.
+    /// Bits of source and format.
     pub message_type: u8,
-    /// Counts down to 0 over the parts of a log.
+    /// Number of parts of the log that follow.
     pub sequence_number: u32,
-    /// Quality of the GPS time, as the receiver manual numbers it.
+    /// Quality of the GPS time, as numbered in the receiver manual.
     pub time_status: u8,
-    /// Weeks since 1980-01-06.
+    /// GPS week: weeks since 1980-01-06.
     pub gps_week_number: u16,
-    /// In ms since the start of the week.
+    /// Time since the start of the GPS week, ms.
     pub gps_week_milliseconds: u32,
-    /// Bits, as the receiver manual numbers them.
+    /// Status bits, as numbered in the receiver manual.
     pub receiver_status: u32,
-    /// Idle time of the receiver's processor, %; 255: not known.
+    /// Idle time of the receiver's processor, %; 255 if unknown.
     pub idle_time: f32,
 }
 
 impl Oem7Header {
-    /// Message_type of a log.
+    /// Value of `message_type` for a log.
     pub const OEM7MSGTYPE_LOG: u16 = 0;
 }
 
 /// State of the inertial solution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct InertialSolutionStatus {
-    /// One of the constants.
+    /// Status, one of the constants of this struct.
     pub status: u32,
 }
 
@@ -80,7 +80,7 @@ impl InertialSolutionStatus {
 /// Method of a position or velocity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PositionOrVelocityType {
-    /// One of the constants.
+    /// Type, one of the constants of this struct.
     #[serde(rename = "type")]
     pub type_: u32,
 }
@@ -151,7 +151,7 @@ impl PositionOrVelocityType {
 /// Aids that the inertial solution used; the names are spelt as the driver spells them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct INSExtendedSolutionStatus {
-    /// The bits.
+    /// Bit mask of the constants of this struct.
     pub status: u32,
 }
 
@@ -188,7 +188,7 @@ impl INSExtendedSolutionStatus {
     pub const EXTERNAL_VELOCITY_UPDATE: u32 = 16384;
     /// External attitude used.
     pub const EXTERNAL_ATTITUDE_UPDATE: u32 = 32768;
-    /// The driver's number, but the bit is 0x10000.
+    /// Number in the driver; the bit is 0x10000.
     pub const EXTERNAL_HEADING_UPDATE: u32 = 65535;
     /// External height used.
     pub const EXTERNAL_HEIGHT_UPDATE: u32 = 131072;
@@ -214,7 +214,7 @@ impl INSExtendedSolutionStatus {
     pub const ALIGNMENT_INDICATION_2: u32 = 134217728;
     /// Bit 2 of ALIGNMENT_*.
     pub const ALIGNMENT_INDICATION_3: u32 = 268435456;
-    /// The driver's number, but the bit is 0x20000000.
+    /// Number in the driver; the bit is 0x20000000.
     pub const NVM_SEED_INDICATION_1: u32 = 538870912;
     /// Bit 1 of NVM_SEED_*.
     pub const NVM_SEED_INDICATION_2: u32 = 1073741824;
@@ -253,23 +253,23 @@ pub struct INSPVA {
     pub header: Header,
     /// GPS time of the solution.
     pub nov_header: Oem7Header,
-    /// In deg, datum of the receiver, by default WGS 84.
+    /// Latitude, degrees, in the datum of the receiver (WGS 84 by default).
     pub latitude: f64,
-    /// In deg, datum of the receiver, by default WGS 84.
+    /// Longitude, degrees, in the datum of the receiver (WGS 84 by default).
     pub longitude: f64,
-    /// In m above the ellipsoid.
+    /// Height above the ellipsoid, m.
     pub height: f64,
-    /// In m/s.
+    /// North velocity, m/s.
     pub north_velocity: f64,
-    /// In m/s.
+    /// East velocity, m/s.
     pub east_velocity: f64,
-    /// In m/s.
+    /// Up velocity, m/s.
     pub up_velocity: f64,
-    /// In deg, right-handed about the forward (y) axis.
+    /// Roll, degrees, right-handed about the forward (y) axis.
     pub roll: f64,
-    /// In deg, right-handed about the right (x) axis.
+    /// Pitch, degrees, right-handed about the right (x) axis.
     pub pitch: f64,
-    /// In deg, clockwise from true north.
+    /// Azimuth, degrees, clockwise from true north.
     pub azimuth: f64,
     /// State of the solution.
     pub status: InertialSolutionStatus,
@@ -286,46 +286,46 @@ pub struct INSPVAX {
     pub ins_status: InertialSolutionStatus,
     /// Method of the position.
     pub pos_type: PositionOrVelocityType,
-    /// In deg, datum of the receiver, by default WGS 84.
+    /// Latitude, degrees, in the datum of the receiver (WGS 84 by default).
     pub latitude: f64,
-    /// In deg, datum of the receiver, by default WGS 84.
+    /// Longitude, degrees, in the datum of the receiver (WGS 84 by default).
     pub longitude: f64,
-    /// In m above mean sea level, so ellipsoidal height is height + undulation.
+    /// Height above mean sea level, m: the ellipsoidal height is height + undulation.
     pub height: f64,
-    /// In m, geoid above the ellipsoid.
+    /// Height of the geoid above the ellipsoid, m.
     pub undulation: f32,
-    /// In m/s.
+    /// North velocity, m/s.
     pub north_velocity: f64,
-    /// In m/s.
+    /// East velocity, m/s.
     pub east_velocity: f64,
-    /// In m/s.
+    /// Up velocity, m/s.
     pub up_velocity: f64,
-    /// In deg, right-handed about the forward (y) axis.
+    /// Roll, degrees, right-handed about the forward (y) axis.
     pub roll: f64,
-    /// In deg, right-handed about the right (x) axis.
+    /// Pitch, degrees, right-handed about the right (x) axis.
     pub pitch: f64,
-    /// In deg, clockwise from true north.
+    /// Azimuth, degrees, clockwise from true north.
     pub azimuth: f64,
-    /// In m.
+    /// Standard deviation of the latitude, m.
     pub latitude_stdev: f32,
-    /// In m.
+    /// Standard deviation of the longitude, m.
     pub longitude_stdev: f32,
-    /// In m.
+    /// Standard deviation of the height, m.
     pub height_stdev: f32,
-    /// In m/s.
+    /// Standard deviation of the north velocity, m/s.
     pub north_velocity_stdev: f32,
-    /// In m/s.
+    /// Standard deviation of the east velocity, m/s.
     pub east_velocity_stdev: f32,
-    /// In m/s.
+    /// Standard deviation of the up velocity, m/s.
     pub up_velocity_stdev: f32,
-    /// In deg.
+    /// Standard deviation of the roll, degrees.
     pub roll_stdev: f32,
-    /// In deg.
+    /// Standard deviation of the pitch, degrees.
     pub pitch_stdev: f32,
-    /// In deg.
+    /// Standard deviation of the azimuth, degrees.
     pub azimuth_stdev: f32,
     /// Aids in use.
     pub ext_sol_status: INSExtendedSolutionStatus,
-    /// In s since the last position or zero velocity update.
+    /// Time since the last position or zero velocity update, s.
     pub time_since_update: u16,
 }

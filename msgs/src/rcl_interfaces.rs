@@ -35,39 +35,39 @@ services! {
     SetParametersAtomically: SetParametersAtomicallyRequest [Parameter], SetParametersAtomicallyResponse [SetParametersResult];
 }
 
-/// One line of a log.
+/// Log message, as on `/rosout`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Log {
-    /// Time of writing.
+    /// Time at which it was logged.
     pub stamp: Time,
-    /// One of the constants.
+    /// Severity, one of the constants of this struct.
     pub level: u8,
-    /// The logger.
+    /// Name of the logger.
     pub name: String,
-    /// The text.
+    /// Text of the message.
     pub msg: String,
-    /// Source file it came from.
+    /// Source file of the call.
     pub file: String,
-    /// Function it came from.
+    /// Function of the call.
     pub function: String,
-    /// Line it came from.
+    /// Line of the call.
     pub line: u32,
 }
 
 impl Log {
-    /// For debugging.
+    /// Severity of messages for debugging.
     pub const DEBUG: u8 = 10;
-    /// Of interest to the operator.
+    /// Severity of messages for the operator.
     pub const INFO: u8 = 20;
-    /// May lead to a fault.
+    /// Severity of warnings: a fault is possible.
     pub const WARN: u8 = 30;
-    /// Something failed.
+    /// Severity of errors: an operation failed.
     pub const ERROR: u8 = 40;
-    /// The node cannot continue.
+    /// Severity of fatal errors: the node cannot continue.
     pub const FATAL: u8 = 50;
 }
 
-/// The types of parameters.
+/// Types of parameters.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ParameterType {
     /// Padding: a structure on the wire has at least one byte.
@@ -77,111 +77,111 @@ pub struct ParameterType {
 impl ParameterType {
     /// No value.
     pub const PARAMETER_NOT_SET: u8 = 0;
-    /// Bool_value.
+    /// Type of `bool_value`.
     pub const PARAMETER_BOOL: u8 = 1;
-    /// Integer_value.
+    /// Type of `integer_value`.
     pub const PARAMETER_INTEGER: u8 = 2;
-    /// Double_value.
+    /// Type of `double_value`.
     pub const PARAMETER_DOUBLE: u8 = 3;
-    /// String_value.
+    /// Type of `string_value`.
     pub const PARAMETER_STRING: u8 = 4;
-    /// Byte_array_value.
+    /// Type of `byte_array_value`.
     pub const PARAMETER_BYTE_ARRAY: u8 = 5;
-    /// Bool_array_value.
+    /// Type of `bool_array_value`.
     pub const PARAMETER_BOOL_ARRAY: u8 = 6;
-    /// Integer_array_value.
+    /// Type of `integer_array_value`.
     pub const PARAMETER_INTEGER_ARRAY: u8 = 7;
-    /// Double_array_value.
+    /// Type of `double_array_value`.
     pub const PARAMETER_DOUBLE_ARRAY: u8 = 8;
-    /// String_array_value.
+    /// Type of `string_array_value`.
     pub const PARAMETER_STRING_ARRAY: u8 = 9;
 }
 
-/// Value of a parameter: the one field that type names.
+/// Value of a parameter: `type` selects the field in use.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ParameterValue {
-    /// One of ParameterType.
+    /// Type, one of [`ParameterType`].
     #[serde(rename = "type")]
     pub type_: u8,
-    /// Of PARAMETER_BOOL.
+    /// Value of type PARAMETER_BOOL.
     pub bool_value: bool,
-    /// Of PARAMETER_INTEGER.
+    /// Value of type PARAMETER_INTEGER.
     pub integer_value: i64,
-    /// Of PARAMETER_DOUBLE.
+    /// Value of type PARAMETER_DOUBLE.
     pub double_value: f64,
-    /// Of PARAMETER_STRING.
+    /// Value of type PARAMETER_STRING.
     pub string_value: String,
-    /// Of PARAMETER_BYTE_ARRAY.
+    /// Value of type PARAMETER_BYTE_ARRAY.
     pub byte_array_value: ByteBuf,
-    /// Of PARAMETER_BOOL_ARRAY.
+    /// Value of type PARAMETER_BOOL_ARRAY.
     pub bool_array_value: Vec<bool>,
-    /// Of PARAMETER_INTEGER_ARRAY.
+    /// Value of type PARAMETER_INTEGER_ARRAY.
     pub integer_array_value: Vec<i64>,
-    /// Of PARAMETER_DOUBLE_ARRAY.
+    /// Value of type PARAMETER_DOUBLE_ARRAY.
     pub double_array_value: Vec<f64>,
-    /// Of PARAMETER_STRING_ARRAY.
+    /// Value of type PARAMETER_STRING_ARRAY.
     pub string_array_value: Vec<String>,
 }
 
-/// A named value.
+/// Parameter: name and value.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
-    /// Full name, dots between levels.
+    /// Full name, with dots between levels.
     pub name: String,
-    /// Its value.
+    /// Value of the parameter.
     pub value: ParameterValue,
 }
 
-/// Numbers a parameter may take, both ends included.
+/// Range of a floating-point parameter, both ends included.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FloatingPointRange {
-    /// Least.
+    /// Smallest value.
     pub from_value: f64,
-    /// Greatest.
+    /// Largest value.
     pub to_value: f64,
-    /// Between neighbours, 0: any.
+    /// Step between allowed values; 0 if any is allowed.
     pub step: f64,
 }
 
-/// Integers a parameter may take, both ends included.
+/// Range of an integer parameter, both ends included.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct IntegerRange {
-    /// Least.
+    /// Smallest value.
     pub from_value: i64,
-    /// Greatest.
+    /// Largest value.
     pub to_value: i64,
-    /// Between neighbours, 0: any.
+    /// Step between allowed values; 0 if any is allowed.
     pub step: u64,
 }
 
-/// Description of a parameter besides its value.
+/// Description of a parameter without its value.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ParameterDescriptor {
     /// Full name.
     pub name: String,
-    /// One of ParameterType.
+    /// Type, one of [`ParameterType`].
     #[serde(rename = "type")]
     pub type_: u8,
-    /// Its purpose.
+    /// Purpose of the parameter.
     pub description: String,
-    /// Rules in words.
+    /// Constraints as text.
     pub additional_constraints: String,
-    /// True: cannot change while the node runs.
+    /// True if the parameter cannot change while the node runs.
     pub read_only: bool,
-    /// True: may change its type.
+    /// True if the type may change.
     pub dynamic_typing: bool,
-    /// Range of a number.
+    /// Range of a floating-point parameter; at most one entry.
     pub floating_point_range: Vec<FloatingPointRange>,
-    /// Range of an integer.
+    /// Range of an integer parameter; at most one entry.
     pub integer_range: Vec<IntegerRange>,
 }
 
-/// Outcome of setting a parameter.
+/// Result of setting a parameter.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetParametersResult {
-    /// True: it was.
+    /// True if the parameter was set.
     pub successful: bool,
-    /// Reason of a refusal.
+    /// Reason of a failure.
     pub reason: String,
 }
 
@@ -190,26 +190,26 @@ pub struct SetParametersResult {
 pub struct ListParametersResult {
     /// Full names.
     pub names: Vec<String>,
-    /// The levels above them.
+    /// Prefixes of the names, one per level above them.
     pub prefixes: Vec<String>,
 }
 
-/// Change of parameters of a node.
+/// Change of the parameters of a node.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ParameterEvent {
     /// Time of the change.
     pub stamp: Time,
     /// Full name of the node.
     pub node: String,
-    /// Declared.
+    /// Declared parameters.
     pub new_parameters: Vec<Parameter>,
-    /// Set anew.
+    /// Changed parameters.
     pub changed_parameters: Vec<Parameter>,
-    /// Undeclared.
+    /// Undeclared parameters.
     pub deleted_parameters: Vec<Parameter>,
 }
 
-/// Descriptors of parameters.
+/// Queries descriptors of parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct DescribeParameters;
 
@@ -223,11 +223,11 @@ pub struct DescribeParametersRequest {
 /// Response of [`DescribeParameters`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DescribeParametersResponse {
-    /// In the order of the names.
+    /// Descriptors in the order of the names.
     pub descriptors: Vec<ParameterDescriptor>,
 }
 
-/// Values of parameters.
+/// Queries values of parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct GetParameters;
 
@@ -241,11 +241,11 @@ pub struct GetParametersRequest {
 /// Response of [`GetParameters`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GetParametersResponse {
-    /// In the order of the names.
+    /// Values in the order of the names.
     pub values: Vec<ParameterValue>,
 }
 
-/// Types of parameters.
+/// Queries types of parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct GetParameterTypes;
 
@@ -259,119 +259,119 @@ pub struct GetParameterTypesRequest {
 /// Response of [`GetParameterTypes`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GetParameterTypesResponse {
-    /// One of ParameterType each, in the order of the names.
+    /// Types in the order of the names, each one of [`ParameterType`].
     pub types: ByteBuf,
 }
 
-/// Names of parameters.
+/// Lists names of parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct ListParameters;
 
 /// Request of [`ListParameters`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ListParametersRequest {
-    /// Only below these; none: all.
+    /// Prefixes of the listed names; empty lists all.
     pub prefixes: Vec<String>,
-    /// Levels below a prefix.
+    /// Maximum number of levels below a prefix, [`Self::DEPTH_RECURSIVE`] without limit.
     pub depth: u64,
 }
 
 impl ListParametersRequest {
-    /// No limit.
+    /// Depth without limit.
     pub const DEPTH_RECURSIVE: u64 = 0;
 }
 
 /// Response of [`ListParameters`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ListParametersResponse {
-    /// The listing.
+    /// Listed names and prefixes.
     pub result: ListParametersResult,
 }
 
-/// Set parameters, each on its own.
+/// Sets parameters one by one.
 #[derive(Clone, Copy, Debug)]
 pub struct SetParameters;
 
 /// Request of [`SetParameters`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetParametersRequest {
-    /// Names and values.
+    /// Parameters to set.
     pub parameters: Vec<Parameter>,
 }
 
 /// Response of [`SetParameters`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetParametersResponse {
-    /// In the order of the parameters.
+    /// Results in the order of the parameters.
     pub results: Vec<SetParametersResult>,
 }
 
-/// Set parameters, all or none.
+/// Sets parameters, all or none.
 #[derive(Clone, Copy, Debug)]
 pub struct SetParametersAtomically;
 
 /// Request of [`SetParametersAtomically`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetParametersAtomicallyRequest {
-    /// Names and values.
+    /// Parameters to set.
     pub parameters: Vec<Parameter>,
 }
 
 /// Response of [`SetParametersAtomically`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetParametersAtomicallyResponse {
-    /// For all of them.
+    /// Result of the whole request.
     pub result: SetParametersResult,
 }
 
-/// Level of a logger.
+/// Severity threshold of a logger.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LoggerLevel {
-    /// The logger, levels parted by dots.
+    /// Name of the logger, with dots between levels.
     pub name: String,
-    /// One of the constants.
+    /// Threshold, one of the constants of this struct.
     pub level: u32,
 }
 
 impl LoggerLevel {
-    /// Not set.
+    /// Threshold not set.
     pub const LOG_LEVEL_UNKNOWN: u8 = 0;
-    /// As in [`Log`].
+    /// Threshold [`Log::DEBUG`].
     pub const LOG_LEVEL_DEBUG: u8 = 10;
-    /// As in [`Log`].
+    /// Threshold [`Log::INFO`].
     pub const LOG_LEVEL_INFO: u8 = 20;
-    /// As in [`Log`].
+    /// Threshold [`Log::WARN`].
     pub const LOG_LEVEL_WARN: u8 = 30;
-    /// As in [`Log`].
+    /// Threshold [`Log::ERROR`].
     pub const LOG_LEVEL_ERROR: u8 = 40;
-    /// As in [`Log`].
+    /// Threshold [`Log::FATAL`].
     pub const LOG_LEVEL_FATAL: u8 = 50;
 }
 
-/// Outcome of setting the level of a logger.
+/// Result of setting the level of a logger.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetLoggerLevelsResult {
-    /// True: it was.
+    /// True if the level was set.
     pub successful: bool,
-    /// Reason of a refusal.
+    /// Reason of a failure.
     pub reason: String,
 }
 
-/// Levels of loggers.
+/// Queries levels of loggers.
 #[derive(Clone, Copy, Debug)]
 pub struct GetLoggerLevels;
 
-/// Loggers whose levels are asked for.
+/// Request of [`GetLoggerLevels`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GetLoggerLevelsRequest {
     /// Names of loggers.
     pub names: Vec<String>,
 }
 
-/// Their levels.
+/// Response of [`GetLoggerLevels`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GetLoggerLevelsResponse {
-    /// In the order of the names.
+    /// Levels in the order of the names.
     pub levels: Vec<LoggerLevel>,
 }
 
@@ -379,16 +379,16 @@ pub struct GetLoggerLevelsResponse {
 #[derive(Clone, Copy, Debug)]
 pub struct SetLoggerLevels;
 
-/// Levels to set.
+/// Request of [`SetLoggerLevels`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetLoggerLevelsRequest {
     /// Loggers and their levels.
     pub levels: Vec<LoggerLevel>,
 }
 
-/// Outcomes.
+/// Response of [`SetLoggerLevels`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetLoggerLevelsResponse {
-    /// In the order of the levels.
+    /// Results in the order of the levels.
     pub results: Vec<SetLoggerLevelsResult>,
 }

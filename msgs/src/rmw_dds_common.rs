@@ -16,7 +16,7 @@ messages! {
 /// GID of an endpoint or a participant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Gid {
-    /// Its GUID.
+    /// GUID of the participant or endpoint.
     pub data: [u8; 16],
 }
 
@@ -27,9 +27,9 @@ pub struct NodeEntitiesInfo<G = Gid> {
     pub node_namespace: String,
     /// Without the namespace.
     pub node_name: String,
-    /// Its subscriptions.
+    /// GIDs of the subscriptions of the node.
     pub reader_gid_seq: Vec<G>,
-    /// Its publishers.
+    /// GIDs of the publishers of the node.
     pub writer_gid_seq: Vec<G>,
 }
 
@@ -38,6 +38,6 @@ pub struct NodeEntitiesInfo<G = Gid> {
 pub struct ParticipantEntitiesInfo<G = Gid> {
     /// The participant.
     pub gid: G,
-    /// Its nodes.
+    /// Nodes of the participant.
     pub node_entities_info_seq: Vec<NodeEntitiesInfo<G>>,
 }

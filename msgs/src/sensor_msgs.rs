@@ -28,13 +28,13 @@ messages! {
 /// One field of the points of a PointCloud2.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PointField {
-    /// Such as x, intensity, t.
+    /// Name, such as x, intensity or t.
     pub name: String,
-    /// Bytes from the start of the point.
+    /// Byte offset from the start of the point.
     pub offset: u32,
-    /// One of the constants.
+    /// Type of an element: one of the constants of this struct.
     pub datatype: u8,
-    /// Elements in the field.
+    /// Number of elements.
     pub count: u32,
 }
 
@@ -60,68 +60,68 @@ impl PointField {
 /// Points as packed binary records.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PointCloud2 {
-    /// Time of acquisition, and frame of the coordinates.
+    /// Acquisition time and frame of the coordinates.
     pub header: Header,
-    /// Rows; 1 when unordered.
+    /// Number of rows; 1 if the cloud is unordered.
     pub height: u32,
-    /// Points in a row.
+    /// Number of points per row.
     pub width: u32,
     /// Layout of a point.
     pub fields: Vec<PointField>,
-    /// Byte order of the numbers.
+    /// True if the numbers are big-endian.
     pub is_bigendian: bool,
-    /// Bytes from point to point.
+    /// Bytes per point.
     pub point_step: u32,
-    /// Bytes from row to row.
+    /// Bytes per row.
     pub row_step: u32,
-    /// The points, row_step * height bytes.
+    /// Point data, `row_step * height` bytes.
     pub data: ByteBuf,
-    /// True: no point has an invalid (NaN) coordinate.
+    /// True if no point has an invalid (NaN) coordinate.
     pub is_dense: bool,
 }
 
 /// One value for each point of a PointCloud.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ChannelFloat32 {
-    /// Such as intensity, rgb.
+    /// Name, such as intensity or rgb.
     pub name: String,
-    /// As many as points.
+    /// Value of each point, in the order of the points.
     pub values: Vec<f32>,
 }
 
-/// Points with named values, replaced by PointCloud2.
+/// Point cloud with named channels; deprecated in favour of [`PointCloud2`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PointCloud {
-    /// Time of acquisition, and frame of the coordinates.
+    /// Acquisition time and frame of the coordinates.
     pub header: Header,
-    /// In m.
+    /// Coordinates, m.
     pub points: Vec<Point32>,
-    /// Further values.
+    /// Channels with one value per point.
     pub channels: Vec<ChannelFloat32>,
 }
 
-/// One turn of a planar laser, in the plane z = 0 of its frame.
+/// One sweep of a planar laser scanner, in the plane z = 0 of its frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LaserScan {
-    /// Time of the first ray, and frame of the scanner: angles about z, 0 along x.
+    /// Time of the first ray, and frame of the scanner: angles are about z, 0 along x.
     pub header: Header,
     /// Angle of the first ray, rad.
     pub angle_min: f32,
     /// Angle of the last ray, rad.
     pub angle_max: f32,
-    /// Angle from ray to ray, rad; negative: clockwise.
+    /// Angle between consecutive rays, rad; negative if clockwise.
     pub angle_increment: f32,
-    /// Time from ray to ray, s; 0: all at once.
+    /// Time between consecutive rays, s; 0 if all are simultaneous.
     pub time_increment: f32,
-    /// Time from scan to scan, s.
+    /// Time between scans, s.
     pub scan_time: f32,
-    /// Least valid range, m.
+    /// Minimum valid range, m.
     pub range_min: f32,
-    /// Greatest valid range, m.
+    /// Maximum valid range, m.
     pub range_max: f32,
-    /// Range of each ray, m (REP 117: infinite no return, minus infinite too near, NaN invalid).
+    /// Range of each ray, m (REP 117: +inf without a return, -inf if too near, NaN if invalid).
     pub ranges: Vec<f32>,
-    /// Of each ray, in units of the scanner; may be empty.
+    /// Intensity of each ray, in device-specific units; may be empty.
     pub intensities: Vec<f32>,
 }
 
@@ -132,128 +132,130 @@ pub struct LaserEcho {
     pub echoes: Vec<f32>,
 }
 
-/// One turn of a planar laser with any number of echoes for each ray, in the plane z = 0 of its frame.
+/// One sweep of a planar laser scanner with any number of echoes per ray, in the plane z = 0 of its frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MultiEchoLaserScan {
-    /// Time of the first ray, and frame of the scanner: angles about z, 0 along x.
+    /// Time of the first ray, and frame of the scanner: angles are about z, 0 along x.
     pub header: Header,
     /// Angle of the first ray, rad.
     pub angle_min: f32,
     /// Angle of the last ray, rad.
     pub angle_max: f32,
-    /// Angle from ray to ray, rad; negative: clockwise.
+    /// Angle between consecutive rays, rad; negative if clockwise.
     pub angle_increment: f32,
-    /// Time from ray to ray, s; 0: all at once.
+    /// Time between consecutive rays, s; 0 if all are simultaneous.
     pub time_increment: f32,
-    /// Time from scan to scan, s.
+    /// Time between scans, s.
     pub scan_time: f32,
-    /// Least valid range, m.
+    /// Minimum valid range, m.
     pub range_min: f32,
-    /// Greatest valid range, m.
+    /// Maximum valid range, m.
     pub range_max: f32,
-    /// Ranges of each ray, m (REP 117: infinite no return, minus infinite too near, NaN invalid).
+    /// Ranges of each ray, m (REP 117: +inf without a return, -inf if too near, NaN if invalid).
     pub ranges: Vec<LaserEcho>,
-    /// Of each echo, in units of the scanner; may be empty.
+    /// Intensities of each ray, in device-specific units; may be empty.
     pub intensities: Vec<LaserEcho>,
 }
 
-/// An image without compression.
+/// Uncompressed image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Image {
-    /// Time of acquisition, and optical frame: x right, y down, z forward.
+    /// Acquisition time and optical frame: x right, y down, z forward.
     pub header: Header,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Pixels in a row.
+    /// Number of pixels per row.
     pub width: u32,
     /// Encoding of a pixel, such as 16UC1 or mono8.
     pub encoding: String,
-    /// Byte order of the numbers, 0 or 1.
+    /// Byte order of the pixel values: 1 if big-endian.
     pub is_bigendian: u8,
-    /// Bytes from row to row.
+    /// Bytes per row.
     pub step: u32,
-    /// The pixels, step * height bytes.
+    /// Pixel data, `step * height` bytes.
     pub data: ByteBuf,
 }
 
-/// Part of an image; all zero is the whole.
+/// Rectangle of an image; all zero means the whole image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RegionOfInterest {
-    /// First column.
+    /// First column, pixels.
     pub x_offset: u32,
-    /// First row.
+    /// First row, pixels.
     pub y_offset: u32,
-    /// Rows.
+    /// Number of rows; 0 means all.
     pub height: u32,
-    /// Columns.
+    /// Number of columns; 0 means all.
     pub width: u32,
-    /// True: the rectified image is to be cut like this.
+    /// True if the rectified image is to be cropped to this rectangle.
     pub do_rectify: bool,
 }
 
-/// Map of a camera from rays to pixels. A pixel's whole coordinates are its centre.
+/// Calibration of a camera. Integer pixel coordinates are pixel centres.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CameraInfo {
-    /// Time of acquisition, and optical frame: x right, y down, z forward.
+    /// Acquisition time and optical frame: x right, y down, z forward.
     pub header: Header,
-    /// Rows of the whole image.
+    /// Number of rows of the full image.
     pub height: u32,
-    /// Pixels in a row of the whole image.
+    /// Number of pixels per row of the full image.
     pub width: u32,
-    /// The model of `d`: plumb_bob, rational_polynomial, equidistant.
+    /// Distortion model: plumb_bob, rational_polynomial or equidistant.
     pub distortion_model: String,
-    /// Parameters of the distortion.
+    /// Distortion coefficients of that model.
     pub d: Vec<f64>,
-    /// Camera matrix of the raw image, row-major; 0 first: not calibrated.
+    /// Intrinsic camera matrix of the raw image, 3 x 3, row-major, pixels; `k[0]` is 0 if the camera is not
+    /// calibrated.
     pub k: [f64; 9],
-    /// Rotation from the camera to the rectified one.
+    /// Rotation from the camera frame to the rectified frame, 3 x 3, row-major.
     pub r: [f64; 9],
-    /// Projection of the rectified image, row-major.
+    /// Projection matrix of the rectified image, 3 x 4, row-major, pixels.
     pub p: [f64; 12],
-    /// Pixels in one, 0 as 1.
+    /// Horizontal binning: raw pixels per pixel; 0 means 1.
     pub binning_x: u32,
-    /// Rows in one, 0 as 1.
+    /// Vertical binning: raw rows per row; 0 means 1.
     pub binning_y: u32,
-    /// Part of the image that is sent.
+    /// Transmitted rectangle of the image, in raw pixels.
     pub roi: RegionOfInterest,
 }
 
-/// An image in a compressed format.
+/// Compressed image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CompressedImage {
-    /// Time of acquisition, and frame of the camera.
+    /// Acquisition time and frame of the camera.
     pub header: Header,
-    /// Such as png or jpeg.
+    /// Format, such as png or jpeg.
     pub format: String,
-    /// The file as bytes.
+    /// Bytes of the compressed file.
     pub data: ByteBuf,
 }
 
-/// Inertial measurement. Covariances are 3x3 row-major about x, y, z; all zero is unknown, -1 first: no such measurement.
+/// Inertial measurement. Covariances are 3 x 3, row-major, about x, y, z: all zero if unknown, -1 first if there is
+/// no such measurement.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Imu {
-    /// Time, and frame of the sensor.
+    /// Acquisition time and frame of the sensor.
     pub header: Header,
-    /// Sensor in a fixed frame (REP 145: east-north-up).
+    /// Orientation of the sensor in a world-fixed frame (REP 145: east-north-up).
     pub orientation: Quaternion,
-    /// In rad².
+    /// Covariance of the orientation, rad².
     pub orientation_covariance: [f64; 9],
-    /// In rad/s.
+    /// Angular velocity, rad/s.
     pub angular_velocity: Vector3,
-    /// In (rad/s)².
+    /// Covariance of the angular velocity, (rad/s)².
     pub angular_velocity_covariance: [f64; 9],
-    /// In m/s², gravity included.
+    /// Linear acceleration, gravity not removed, m/s².
     pub linear_acceleration: Vector3,
-    /// In (m/s²)².
+    /// Covariance of the linear acceleration, (m/s²)².
     pub linear_acceleration_covariance: [f64; 9],
 }
 
 /// State of a satellite navigation receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NavSatStatus {
-    /// One of STATUS_*.
+    /// Fix status, one of STATUS_*.
     pub status: i8,
-    /// The systems in use, bits SERVICE_*.
+    /// Satellite systems in use, a bit mask of SERVICE_*.
     pub service: u16,
 }
 
@@ -267,17 +269,17 @@ impl Default for NavSatStatus {
 }
 
 impl NavSatStatus {
-    /// Not set.
+    /// Status not set.
     pub const STATUS_UNKNOWN: i8 = -2;
     /// No position.
     pub const STATUS_NO_FIX: i8 = -1;
     /// Position without augmentation.
     pub const STATUS_FIX: i8 = 0;
-    /// Augmented from satellites.
+    /// Position with satellite-based augmentation.
     pub const STATUS_SBAS_FIX: i8 = 1;
-    /// Augmented from the ground.
+    /// Position with ground-based augmentation.
     pub const STATUS_GBAS_FIX: i8 = 2;
-    /// No system named; compare, do not mask.
+    /// Unknown systems; a value, not a bit.
     pub const SERVICE_UNKNOWN: u16 = 0;
     /// GPS bit.
     pub const SERVICE_GPS: u16 = 1;
@@ -289,32 +291,32 @@ impl NavSatStatus {
     pub const SERVICE_GALILEO: u16 = 8;
 }
 
-/// Position from satellites, WGS 84.
+/// Position from satellite navigation, WGS 84.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NavSatFix {
-    /// Time, and frame of the antenna.
+    /// Acquisition time and frame of the antenna.
     pub header: Header,
-    /// Fix and systems.
+    /// Fix status and satellite systems.
     pub status: NavSatStatus,
-    /// In deg, north positive.
+    /// Latitude, degrees, north positive.
     pub latitude: f64,
-    /// In deg, east positive.
+    /// Longitude, degrees, east positive.
     pub longitude: f64,
-    /// In m above the WGS 84 ellipsoid, NaN where unknown.
+    /// Height above the WGS 84 ellipsoid, m; NaN if unknown.
     pub altitude: f64,
-    /// In m², 3x3 row-major, east north up.
+    /// Covariance of the position, 3 x 3, row-major, east-north-up, m².
     pub position_covariance: [f64; 9],
-    /// One of COVARIANCE_TYPE_*.
+    /// Kind of the covariance, one of COVARIANCE_TYPE_*.
     pub position_covariance_type: u8,
 }
 
 impl NavSatFix {
-    /// Nothing known.
+    /// Unknown covariance.
     pub const COVARIANCE_TYPE_UNKNOWN: u8 = 0;
-    /// Estimated from dilution of precision.
+    /// Covariance estimated from the dilution of precision.
     pub const COVARIANCE_TYPE_APPROXIMATED: u8 = 1;
-    /// Variances known.
+    /// Known variances on the diagonal.
     pub const COVARIANCE_TYPE_DIAGONAL_KNOWN: u8 = 2;
-    /// All known.
+    /// Fully known covariance.
     pub const COVARIANCE_TYPE_KNOWN: u8 = 3;
 }

@@ -36,9 +36,9 @@ pub struct FieldType {
 /// One field of a type.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Field {
-    /// Its name.
+    /// Name of the field.
     pub name: String,
-    /// Its type.
+    /// Type of the field.
     #[serde(rename = "type")]
     pub type_: FieldType,
     /// Default value as it is written.
@@ -50,7 +50,7 @@ pub struct Field {
 pub struct IndividualTypeDescription {
     /// Full name.
     pub type_name: String,
-    /// In order.
+    /// Fields in their order.
     pub fields: Vec<Field>,
 }
 
@@ -66,9 +66,9 @@ pub struct TypeDescription {
 /// Further information.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KeyValue {
-    /// Its kind.
+    /// Kind of the entry.
     pub key: String,
-    /// Its text.
+    /// Text of the entry.
     pub value: String,
 }
 

@@ -14,6 +14,6 @@ messages! {
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize,
 )]
 pub struct UUID {
-    /// In network order.
+    /// Bytes in network order.
     pub uuid: [u8; 16],
 }

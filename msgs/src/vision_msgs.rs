@@ -14,9 +14,9 @@ messages! {
 /// A class of a segmenter.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct VisionClass {
-    /// Its number.
+    /// Number of the class.
     pub class_id: u16,
-    /// Its name.
+    /// Name of the class.
     pub class_name: String,
 }
 

@@ -17,65 +17,65 @@ messages! {
     MarkerArray [Marker];
 }
 
-/// A place on a texture; each part in [0, 1].
+/// Texture coordinates, each in [0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct UVCoordinate {
-    /// Across.
+    /// Horizontal coordinate.
     pub u: f32,
-    /// Along.
+    /// Vertical coordinate.
     pub v: f32,
 }
 
-/// A mesh sent along with its marker.
+/// Mesh file embedded in a marker.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeshFile {
-    /// Its name; the suffix gives the format.
+    /// Name of the file; its suffix gives the format.
     pub filename: String,
-    /// The file as bytes.
+    /// Bytes of the file.
     pub data: ByteBuf,
 }
 
-/// Something to draw; ns and id together are its identity.
+/// Marker; namespace and id identify it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Marker {
-    /// Time, and frame of the pose.
+    /// Stamp, and frame of the pose.
     pub header: Header,
-    /// Namespace of id.
+    /// Namespace of the id.
     pub ns: String,
-    /// Number within ns.
+    /// Number within the namespace.
     pub id: i32,
     /// Shape to draw.
     #[serde(rename = "type")]
     pub type_: i32,
-    /// ADD, DELETE or DELETEALL.
+    /// Action: ADD, DELETE or DELETEALL.
     pub action: i32,
-    /// Header.frame_id from the marker.
+    /// Pose of the marker in the frame of the header.
     pub pose: Pose,
     /// Size along each axis, m.
     pub scale: Vector3,
-    /// Colour of all.
+    /// Colour of the whole marker.
     pub color: ColorRGBA,
-    /// 0: until deleted.
+    /// Lifetime; 0 if it stays until deleted.
     pub lifetime: Duration,
-    /// True: follow the frame after the stamp.
+    /// True if the marker moves with its frame after the stamp.
     pub frame_locked: bool,
     /// Vertices in the frame of the marker, m.
     pub points: Vec<Point>,
-    /// None, or one for each point.
+    /// Colours: none, or one per vertex.
     pub colors: Vec<ColorRGBA>,
-    /// URI of the texture, embedded:// for the one below.
+    /// URI of the texture; `embedded://` refers to `texture`.
     pub texture_resource: String,
     /// The embedded texture.
     pub texture: CompressedImage,
-    /// Place of each vertex on the texture.
+    /// Texture coordinates of each vertex.
     pub uv_coordinates: Vec<UVCoordinate>,
     /// Text of TEXT_VIEW_FACING.
     pub text: String,
-    /// URI of the mesh, embedded:// for the one below.
+    /// URI of the mesh; `embedded://` refers to `mesh_file`.
     pub mesh_resource: String,
     /// The embedded mesh.
     pub mesh_file: MeshFile,
-    /// True: colour the mesh by its own materials.
+    /// True if the mesh is drawn in the colours of its own materials.
     pub mesh_use_embedded_materials: bool,
 }
 
@@ -88,37 +88,37 @@ impl Marker {
     pub const SPHERE: i32 = 2;
     /// Cylinder.
     pub const CYLINDER: i32 = 3;
-    /// A line through all points.
+    /// Line through all points.
     pub const LINE_STRIP: i32 = 4;
-    /// A line for every two points.
+    /// Lines between successive pairs of points.
     pub const LINE_LIST: i32 = 5;
-    /// A box at each point.
+    /// Box at each point.
     pub const CUBE_LIST: i32 = 6;
-    /// A sphere at each point.
+    /// Sphere at each point.
     pub const SPHERE_LIST: i32 = 7;
-    /// A square at each point.
+    /// Square at each point.
     pub const POINTS: i32 = 8;
-    /// Upright text.
+    /// Text that faces the viewer.
     pub const TEXT_VIEW_FACING: i32 = 9;
-    /// A mesh from a file.
+    /// Mesh of a file.
     pub const MESH_RESOURCE: i32 = 10;
-    /// A triangle for every three points.
+    /// Triangles of successive triples of points.
     pub const TRIANGLE_LIST: i32 = 11;
-    /// Arrows from point to point.
+    /// Arrow strip: arrows from each point to the next.
     pub const ARROW_STRIP: i32 = 12;
-    /// Draw or replace.
+    /// Adds or replaces the marker.
     pub const ADD: i32 = 0;
-    /// Same as ADD.
+    /// Replaces the marker, as ADD does.
     pub const MODIFY: i32 = 0;
-    /// Remove this one.
+    /// Deletes the marker.
     pub const DELETE: i32 = 2;
-    /// Remove all, or all of ns where it is set.
+    /// Deletes all markers, or those of the namespace if it is set.
     pub const DELETEALL: i32 = 3;
 }
 
-/// Markers that take effect together.
+/// Markers to apply together.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MarkerArray {
-    /// In the order of their effect.
+    /// Markers in the order in which they apply.
     pub markers: Vec<Marker>,
 }

@@ -71,22 +71,22 @@ impl MapLosses {
         Ok([maps, updates])
     }
 
-    /// Messages lost on the network or at the inbox.
+    /// Number of messages lost on the network or at the inbox.
     pub fn count(&self) -> u64 {
         self.inbox_full() + self.on_network()
     }
 
-    /// Messages rejected by a full inbox or overrun in its queue.
+    /// Number of messages rejected by a full inbox or overrun in its queue.
     pub fn inbox_full(&self) -> u64 {
         self.at_inbox.load(Ordering::Relaxed) + self.before.overrun()
     }
 
-    /// Messages lost on the network.
+    /// Number of messages lost on the network.
     pub fn on_network(&self) -> u64 {
         self.before.on_network()
     }
 
-    /// Undecodable messages.
+    /// Number of undecodable messages.
     pub fn undecodable(&self) -> u64 {
         self.before.undecodable()
     }
@@ -103,7 +103,7 @@ pub struct MapRequests {
 }
 
 impl MapRequests {
-    /// Requests to a mapper of this name.
+    /// Creates requests to the mapper of this name.
     pub fn new(node: &Node, mapper: &str, losses: &MapLosses) -> Result<Self, RuntimeError> {
         let topic = format!("{mapper}/request_keyframe");
         Ok(Self {
@@ -146,7 +146,7 @@ impl MapRequests {
         }
     }
 
-    /// Loss counters.
+    /// Counters of lost messages.
     pub fn losses(&self) -> &MapLosses {
         &self.losses
     }

@@ -62,7 +62,7 @@ pub fn check_topics(params: &Params, elsewhere: impl Fn(&str) -> bool) -> Result
 pub fn handed_over(sent: bool) -> Result<(), String> {
     match sent {
         true => Ok(()),
-        false => Err("busy, ask again".to_owned()),
+        false => Err("the inbox of the node is full: call again".to_owned()),
     }
 }
 

@@ -203,7 +203,7 @@ impl Lattice {
 fn indices<'py>(cells: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, i64>> {
     let numpy = cells.py().import("numpy")?;
     if mask_of(cells)?.is_some() {
-        return Err(refuse("cells are masked: give those that are not"));
+        return Err(refuse("cells are a masked array; pass the unmasked rows"));
     }
     let cells = numpy.call_method1("asarray", (cells,))?;
     let shape = shape_of(&cells)?;

@@ -10,8 +10,8 @@ use pyo3::prelude::*;
 
 use crate::threads::{PATIENCE, on_pool};
 
-/// Neighbours per cell from which a tree of all cells pays off: building it takes the time of half a neighbour per
-/// cell, and it stays until the map changes.
+/// Queried neighbours per cell from which a tree of all cells pays off: building it takes the time of half a
+/// neighbour per cell, and it is kept until the map changes.
 const WORTH: usize = 8;
 
 /// List behind one lock.
@@ -42,7 +42,11 @@ impl SharedList {
         }))
     }
 
-    /// Reads the list beside other readers, for well below a second.
+    /// Reads the list beside other readers. `run` has to take well below a second: signals are handled only before
+    /// and after it.
+    ///
+    /// # Errors
+    /// The exception of a signal handler, such as `KeyboardInterrupt`.
     pub fn read<T: Send>(
         &self,
         py: Python<'_>,
@@ -61,7 +65,10 @@ impl SharedList {
         }
     }
 
-    /// Changes the list, for well below a second.
+    /// Changes the list and drops its search tree. `run` has to take well below a second, as in [`SharedList::read`].
+    ///
+    /// # Errors
+    /// The exception of a signal handler, such as `KeyboardInterrupt`.
     pub fn write<T: Send>(
         &self,
         py: Python<'_>,
@@ -81,19 +88,20 @@ impl SharedList {
         }
     }
 
-    /// Reads the list from a thread without the GIL, for any time.
+    /// Reads the list from a thread without the GIL; `run` may take any time.
     pub fn read_away<T>(&self, run: impl FnOnce(&VoxelList) -> T) -> T {
         run(&self.0.list.read())
     }
 
-    /// Changes the list from a thread without the GIL, for any time.
+    /// Changes the list from a thread without the GIL; `run` may take any time.
     pub fn write_away<T>(&self, run: impl FnOnce(&mut VoxelList) -> T) -> T {
         let mut list = self.0.list.write();
         *self.0.asked.lock() = Asked::default();
         run(&mut list)
     }
 
-    /// Queries of a read-locked list for a number of neighbours, from a thread without the GIL.
+    /// Query on the read-locked list, for `neighbors` neighbours in total. To be called from a thread without the
+    /// GIL.
     pub fn questions<'a>(
         &self,
         list: &'a VoxelList,

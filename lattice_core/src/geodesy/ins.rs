@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
-/// Yaw in -pi..=pi, counter-clockwise from east, of an azimuth in degrees clockwise from north; 90 degrees is yaw 0.
+/// Yaw in radians, -pi..=pi, counter-clockwise from east, of an azimuth in degrees, clockwise from north: 90 degrees
+/// is yaw 0.
 pub fn yaw_rad_from_azimuth_deg(azimuth_deg: f64) -> f64 {
     let yaw_rad = (90.0 - azimuth_deg % 360.0).to_radians();
     yaw_rad - TAU * (yaw_rad / TAU).round()
@@ -41,7 +42,8 @@ impl InsMount {
         }
     }
 
-    /// Pose of base_link in the map, from the INS pose in the map.
+    /// Pose of base_link in the map, from the position of the INS reference point (metres) and the attitude of the
+    /// INS, both in the map frame.
     pub fn map_from_base(
         &self,
         ins_position_m: &Vector3<f64>,

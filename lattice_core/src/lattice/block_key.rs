@@ -21,14 +21,14 @@ impl BlockKey {
     /// Number of cells in a block.
     pub const BLOCK_CELLS: usize = 512;
 
-    /// Code of a lattice index; `None` if an entry is outside `-2^20 ..= 2^20 - 1`.
+    /// Key of a lattice index; `None` if an entry is outside `-2^20 ..= 2^20 - 1`.
     #[inline]
     pub fn pack(w: LatticeIndex) -> Option<BlockKey> {
         let v = w.map(|i| i.wrapping_add(OFFSET) as u32);
         ((v[0] | v[1] | v[2]) >> 21 == 0).then(|| BlockKey::from_halves(BlockKey::halves(v)))
     }
 
-    /// Lattice index of the code.
+    /// Lattice index of the key; meaningless for [`BlockKey::NONE`].
     #[inline]
     pub fn unpack(self) -> LatticeIndex {
         let local = self.place() as i32;
@@ -41,7 +41,7 @@ impl BlockKey {
         ]
     }
 
-    /// Morton key of the cell.
+    /// Morton key of the cell. [`BlockKey::NONE`] yields the last cell, so exclude it before.
     #[inline]
     pub fn key(self) -> Option<MortonKey> {
         MortonKey::pack(self.unpack())
@@ -53,13 +53,13 @@ impl BlockKey {
         self.0
     }
 
-    /// Code of an integer; `None` from 2^63 on.
+    /// Key of an integer; `None` from 2^63 on.
     #[inline]
     pub fn from_raw(raw: u64) -> Option<BlockKey> {
         (raw >> 63 == 0).then_some(BlockKey(raw))
     }
 
-    /// Low and high half of the code of indices offset by 2^20, each below 2^21; for eight lanes of 32 bits.
+    /// Low and high half of the key of indices offset by 2^20, each below 2^21; for eight lanes of 32 bits.
     #[inline(always)]
     pub fn halves([x, y, z]: [u32; 3]) -> [u32; 2] {
         let local = (x & 7) << 6 | (y & 7) << 3 | (z & 7);
@@ -67,13 +67,13 @@ impl BlockKey {
         [local | z << 9 | y << 27, y >> 5 | x << 13]
     }
 
-    /// Code of a low and a high half from [`BlockKey::halves`].
+    /// Key of a low and a high half from [`BlockKey::halves`].
     #[inline(always)]
     pub fn from_halves([low, high]: [u32; 2]) -> BlockKey {
         BlockKey(u64::from(high) << 32 | u64::from(low))
     }
 
-    /// Block: 54 bits.
+    /// Number of the block, below 2^54 except for [`BlockKey::NONE`]; blocks are ordered as their keys.
     #[inline]
     pub fn block(self) -> u64 {
         self.0 >> 9

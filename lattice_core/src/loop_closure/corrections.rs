@@ -6,38 +6,38 @@ use super::middle_ns;
 use crate::odometry::ScanResult;
 use crate::pose::se3;
 
-/// Correction of poses by odometry at a time.
+/// Correction of odometry poses at a time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Anchor {
     /// Time, ns.
     pub stamp_ns: i64,
-    /// Number of the submap of the odometry. Poses of two submaps are not known to each other without a loop.
+    /// Number of the submap of the odometry. The relative pose of two submaps is unknown without a loop.
     pub submap: u32,
-    /// Pose of the frame of the odometry in the map.
+    /// Pose of the odometry frame in the map.
     pub map_from_odom: Isometry3<f64>,
 }
 
-/// Corrections of the poses of a drive. Between two anchors of a submap they are interpolated; at other times the anchor
-/// before counts.
+/// Corrections of the poses of a drive. They are interpolated between two anchors of a submap; at other times, the
+/// anchor before applies.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Corrections {
     anchors: Vec<Anchor>,
 }
 
 impl Corrections {
-    /// Corrections by anchors, in any order of time.
+    /// Creates corrections from anchors in any order.
     pub fn new(mut anchors: Vec<Anchor>) -> Corrections {
         anchors.sort_by_key(|anchor| anchor.stamp_ns);
         Corrections { anchors }
     }
 
-    /// The anchors, in order of time.
+    /// Anchors in order of time.
     pub fn anchors(&self) -> &[Anchor] {
         &self.anchors
     }
 
-    /// Begins a submap at the time of its first point, after the last scan of the one before at `end_ns`. Until a loop is known
-    /// its place is that of the submap before.
+    /// Begins a submap halfway between the end of the last scan of the submap before (`end_ns`) and its first point
+    /// (`begin_ns`); the first submap at `begin_ns`. Until a loop is known, it has the pose of the submap before.
     pub fn begin_submap(&mut self, submap: u32, end_ns: i64, begin_ns: i64) {
         let Some(last) = self.anchors.last().cloned() else {
             self.anchors.push(Anchor {
@@ -58,7 +58,7 @@ impl Corrections {
         });
     }
 
-    /// The correction at a time; `None` without anchors.
+    /// Correction at a time; `None` without anchors.
     pub fn at(&self, stamp_ns: i64) -> Option<Anchor> {
         let next = self
             .anchors
@@ -83,7 +83,7 @@ impl Corrections {
         })
     }
 
-    /// Pose of a scan in the map; that of the odometry without anchors.
+    /// Pose of a scan in the map; its odometry pose without anchors.
     pub fn map_from_base(&self, scan: &ScanResult) -> Isometry3<f64> {
         match self.at(scan.end_ns) {
             Some(anchor) => anchor.map_from_odom * scan.odom_from_base,

@@ -1,4 +1,4 @@
-//! Places of the past near a given one, in a time that does not depend on their number.
+//! Positions of a path within a radius of a point, found in a time that does not depend on their number.
 
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
@@ -8,7 +8,7 @@ use crate::lattice::{Lattice, LatticeError, LatticeIndex, LatticeKind};
 /// Cells per radius: 1.3 leaves 87 FCC cells to visit.
 const CELLS_PER_RADIUS: f64 = 1.3;
 
-/// Positions by the cell of a lattice in which they lie.
+/// Positions by lattice cell.
 #[derive(Clone, Debug)]
 pub struct PlaceHistory {
     lattice: Lattice,
@@ -19,9 +19,10 @@ pub struct PlaceHistory {
 }
 
 impl PlaceHistory {
-    /// A history that finds all positions within a radius, metres.
+    /// Creates an empty history for queries with a radius, metres.
     ///
-    /// Fails if the radius gives no lattice.
+    /// # Errors
+    /// If the radius is not positive and finite, or gives cells beyond the limits of [`Lattice::new`].
     pub fn new(radius_m: f64) -> Result<PlaceHistory, LatticeError> {
         let side_m = radius_m / CELLS_PER_RADIUS;
         let lattice = Lattice::new(LatticeKind::Fcc, side_m.powi(3))?;
@@ -46,17 +47,17 @@ impl PlaceHistory {
         self.radius_m
     }
 
-    /// Cells that a query visits.
+    /// Number of cells that a query visits.
     pub fn cells_visited(&self) -> usize {
         self.steps.len()
     }
 
-    /// Forgets all positions.
+    /// Removes all positions.
     pub fn clear(&mut self) {
         self.places.clear();
     }
 
-    /// Adds a position with its number. Positions beyond the lattice are left out.
+    /// Adds a position (metres) with its number. Positions beyond the range of the lattice are ignored.
     pub fn add(&mut self, number: u32, place_m: &Vector3<f64>) {
         if let Some(index) = self.lattice.quantize(place_m) {
             let cell = self.places.entry(index).or_default();

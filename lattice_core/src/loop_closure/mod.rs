@@ -27,30 +27,31 @@ use crate::pose::se3;
 use crate::registration::Verdict as RegistrationVerdict;
 use verify::register_segments;
 
-/// Distance between segments that share enough surfaces, in root mean squares of the distances of their points.
+/// Distance within which two segments share enough surfaces, in RMS ranges of their points.
 const REACH_ARMS: f64 = 1.0;
-/// Drift that a query of the history allows for, as a part of that distance.
+/// Drift that a query of the history allows for, as a fraction of that distance.
 const DRIFT_PART: f64 = 1.0;
-/// Factor of the distance from which the history is made anew with a larger radius.
+/// Growth of the distance above which the history is rebuilt with a larger radius.
 const WIDER: f64 = 1.5;
-/// Length of the path between two segments of a loop, in the same unit: below, the odometry has both in its map.
+/// Minimum length of the path between two segments of a loop, in the same unit; the map of the odometry covers
+/// shorter ones.
 const LEAST_PATH_ARMS: f64 = 4.0;
-/// Standard deviation of the position between two segments from which a loop closure adds to it, m: three times that of the
-/// closures of simulated drives.
+/// Standard deviation of the position between two segments above which a loop closure reduces it, m: three times that
+/// of closures in simulated drives.
 const LEAST_SIGMA_M: f64 = 0.05;
-/// Loops after which that deviation grows with their number: a drive then has as many as the cube root of its length, and the
-/// system of the graph stays small.
+/// Number of loops above which that deviation grows with their number. The number of loops is then proportional to
+/// the cube root of the length of the drive, and the linear system of the graph stays small.
 const MANY_LOOPS: usize = 200;
-/// Segments on both sides of the nearest one that are its surroundings.
+/// Number of segments before and after the nearest one that are added to the target cloud.
 const AROUND: usize = 2;
-/// Squared Mahalanobis distance up to which the graph explains a loop: that of 99.9 % with 6 degrees of freedom.
+/// Squared Mahalanobis distance up to which a loop agrees with the graph: 99.9 % quantile of 6 degrees of freedom.
 const EXPLAINED: f64 = 22.5;
-/// Standard deviations of the predicted motion between two submaps: of the translation, in root mean squares of the distances of
-/// points, and of the rotation, rad. In simulated streets predictions are off by up to 25 m, where a car ahead deceived the
-/// scans before. A hall that looks the same after a quarter or half a turn has to stay beyond `EXPLAINED`.
+/// Standard deviations of the predicted motion between two submaps: of the translation, in RMS ranges of points, and
+/// of the rotation, rad. In simulated streets, predictions err by up to 25 m after a car ahead misled the odometry. A
+/// hall that is symmetric under a quarter or half turn has to stay beyond `EXPLAINED`.
 const PREDICTED: (f64, f64) = (1.0, 0.3);
 
-/// A loop that was tried.
+/// Attempted loop closure.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LoopAttempt {
@@ -58,17 +59,17 @@ pub struct LoopAttempt {
     pub from: usize,
     /// Number of the later segment.
     pub to: usize,
-    /// Times of the poses of both, ns.
+    /// Times of both poses, ns.
     pub stamps_ns: [i64; 2],
     /// Verdict of the registration.
     pub verdict: RegistrationVerdict,
     /// Reason for the verdict.
     pub reason: String,
-    /// Squared Mahalanobis distance from what the graph predicts.
+    /// Squared Mahalanobis distance of the loop from the prediction of the graph.
     pub innovation: f64,
-    /// True if the loop closes: the verdict is `OK` and the graph explains it.
+    /// True if the loop is closed: the verdict is `OK` and the loop agrees with the graph.
     pub is_closed: bool,
-    /// Pose of the later segment in the frame of the earlier one, as registered.
+    /// Registered pose of the later segment in the frame of the earlier one.
     pub from_to: Isometry3<f64>,
 }
 
@@ -79,14 +80,16 @@ pub struct LoopCloser {
     graph: PoseGraph,
     history: Option<PlaceHistory>,
     attempts: Vec<LoopAttempt>,
-    /// Loops between submaps that are not joined, one of which cannot be held against motions: another has to agree.
+    /// Single loops between submaps that are not joined yet: there is no motion to test them against, so a second
+    /// loop has to agree.
     alone: Vec<LoopEdge>,
 }
 
 impl LoopCloser {
-    /// Takes the next segment of a drive; gives the loop that was tried, if the segment lies near another.
+    /// Adds the next segment of a drive. Returns the attempted loop, if the segment lies near another.
     ///
-    /// Fails if its distances give no lattice of places.
+    /// # Errors
+    /// If the range of the segment gives no lattice for the positions.
     pub fn add(&mut self, segment: Segment) -> Result<Option<&LoopAttempt>, LatticeError> {
         match self.segments.last() {
             None => self.graph.push(segment.odom_from_anchor, Matrix6::zeros()),
@@ -114,7 +117,7 @@ impl LoopCloser {
         Ok(found.and(self.attempts.last()))
     }
 
-    /// The nearest older segment with which a loop would add to what is known.
+    /// Nearest older segment with which a loop would reduce the uncertainty.
     fn candidate(&mut self, to: usize) -> Option<usize> {
         let segment = self.segments.get(to)?;
         let (path_m, arm_m, submap) = (segment.path_m, segment.arm_m, segment.submap);
@@ -176,7 +179,7 @@ impl LoopCloser {
         })
     }
 
-    /// Closes a loop. The first one between two submaps waits for another that agrees with it.
+    /// Closes a loop. The first loop between two submaps waits for a second one that agrees with it.
     fn close(&mut self, edge: LoopEdge) {
         let submap_of = |number: usize| self.segments.get(number).map_or(0, |one| one.submap);
         let ends = |edge: &LoopEdge| (submap_of(edge.from), submap_of(edge.to));
@@ -204,7 +207,7 @@ impl LoopCloser {
         self.settle();
     }
 
-    /// Optimizes the graph, without the loops that the others contradict.
+    /// Optimizes the graph without loops that contradict the others.
     fn settle(&mut self) {
         while !self.graph.loops().is_empty() {
             let worst = match self.graph.optimize() {
@@ -231,7 +234,7 @@ impl LoopCloser {
         }
     }
 
-    /// The submaps whose places in that of a submap are known: joined with it by loops.
+    /// Submaps with a known pose relative to `submap`: those joined with it by loops.
     pub fn joined_with(&self, submap: u32) -> BTreeSet<u32> {
         let of = |number: usize| self.segments.get(number).map(|segment| segment.submap);
         let mut joined = BTreeSet::from([submap]);
@@ -250,7 +253,7 @@ impl LoopCloser {
         }
     }
 
-    /// Segments before one, of a submap, with the poses of their anchors.
+    /// Segments of a submap before one, with the poses of their anchors.
     fn placed(
         &self,
         numbers: impl Iterator<Item = usize>,
@@ -273,7 +276,7 @@ impl LoopCloser {
         }
     }
 
-    /// Makes the history of all segments but the newest anew, after poses or the radius have changed.
+    /// Rebuilds the history from all segments but the newest, after a change of poses or of the radius.
     fn remember_all(&mut self) {
         if let Some(history) = &mut self.history {
             history.clear();
@@ -282,17 +285,17 @@ impl LoopCloser {
         before_newest.for_each(|number| self.remember(number));
     }
 
-    /// All loops that were tried, in order of time.
+    /// Attempted loop closures in order of time.
     pub fn attempts(&self) -> &[LoopAttempt] {
         &self.attempts
     }
 
-    /// Poses of the first scans of the segments in the map, corrected.
+    /// Corrected poses of the first scans of the segments in the map.
     pub fn map_from_anchors(&self) -> &[Isometry3<f64>] {
         self.graph.poses()
     }
 
-    /// The corrections of poses by odometry, as they are now.
+    /// Current corrections of the odometry poses.
     pub fn corrections(&self) -> Corrections {
         let anchor = |stamp_ns: i64, (segment, pose): (&Segment, &Isometry3<f64>)| Anchor {
             stamp_ns,
@@ -323,7 +326,7 @@ impl LoopCloser {
     }
 }
 
-/// The middle of two times, ns.
+/// Midpoint of two times, ns.
 pub fn middle_ns(from_ns: i64, to_ns: i64) -> i64 {
     from_ns.saturating_add(to_ns.saturating_sub(from_ns) / 2)
 }
@@ -342,7 +345,7 @@ fn motion_between(before: &Segment, after: &Segment) -> (Isometry3<f64>, Matrix6
     (motion, positive(grown))
 }
 
-/// The nearest matrix without negative variances: rounding must not leave one.
+/// Nearest matrix without negative eigenvalues, which rounding may produce.
 fn positive(covariance: Matrix6<f64>) -> Matrix6<f64> {
     let mut eigen = (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
     eigen.eigenvalues.apply(|value| *value = value.max(0.0));

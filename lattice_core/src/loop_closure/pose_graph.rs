@@ -11,14 +11,14 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3, Matrix6, Vector6};
 
 use crate::pose::se3;
 
-/// Iterations of an optimization, at most; a loop that turns by a quarter takes six.
+/// Iteration limit of an optimization; a loop with a quarter turn takes six.
 const MAX_ITERATIONS: usize = 30;
-/// Largest change of a pose at which an optimization ends, m and rad.
+/// Change of poses below which an optimization ends, m and rad.
 const CONVERGED: f64 = 1e-6;
-/// Change of poses since a linearization, m and rad, from which it is made anew: covariances turn with the poses.
+/// Change of poses since a linearization above which it is recomputed, m and rad: covariances rotate with the poses.
 const STALE: (f64, f64) = (0.5, 0.01);
 
-/// A measured pose of a node in the frame of an earlier one.
+/// Edge: measured pose of a node in the frame of an earlier one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopEdge {
     /// Number of the earlier node.
@@ -32,37 +32,37 @@ pub struct LoopEdge {
 }
 
 impl LoopEdge {
-    /// The nodes between which the edge measures.
+    /// Numbers of both nodes.
     fn span(&self) -> Range<usize> {
         self.from..self.to
     }
 }
 
-/// Poses of nodes in order of time, each known by the motion from the one before, and loop closures between them.
+/// Pose graph of a path: nodes in order of time, each with the motion from the one before, and loop closures.
 #[derive(Clone, Debug, Default)]
 pub struct PoseGraph {
     map_from_nodes: Vec<Isometry3<f64>>,
     /// Motion from each node to the next one, and the covariance of its twist in the frame of the node.
     motions: Vec<(Isometry3<f64>, Matrix6<f64>)>,
     loops: Vec<LoopEdge>,
-    /// The linearization at the poses, made by the last optimization.
+    /// Linearization at the poses of the last optimization.
     solved: Option<Linearization>,
 }
 
-/// Sums along the chain and the system of the loop closures, at given poses.
+/// Sums along the path and the linear system of the loop closures, at given poses.
 #[derive(Clone, Debug)]
 struct Linearization {
-    /// Covariance of each node since the first one.
+    /// Covariance of each node relative to the first one.
     covariances: Vec<Matrix6<f64>>,
-    /// Innovation covariance of all loop closures together.
+    /// Joint innovation covariance of all loop closures.
     system: Option<Cholesky<f64, Dyn>>,
-    /// Largest change of a pose since then, m and rad.
+    /// Largest change of a pose since the linearization, m and rad.
     changed: (f64, f64),
 }
 
 impl PoseGraph {
-    /// Adds the first node, or one after the last: `motion` leads to it from the last one, with the covariance of its twist in
-    /// the frame of the last one. The first node is at the motion.
+    /// Adds a node. `motion` leads from the last node to it, with the covariance of its twist in the frame of the
+    /// last node; for the first node, `motion` is its pose.
     pub fn push(&mut self, motion: Isometry3<f64>, covariance: Matrix6<f64>) {
         match self.map_from_nodes.last() {
             None => self.map_from_nodes.push(motion),
@@ -90,7 +90,7 @@ impl PoseGraph {
         &self.motions
     }
 
-    /// The loop closures.
+    /// Loop closures.
     pub fn loops(&self) -> &[LoopEdge] {
         &self.loops
     }
@@ -122,8 +122,8 @@ impl PoseGraph {
         Some((earlier.inverse() * later, covariance))
     }
 
-    /// Squared Mahalanobis distance of a measurement from the graph without it; with 6 degrees of freedom if all covariances
-    /// are right. Infinite if the nodes are unknown.
+    /// Squared Mahalanobis distance of a measurement from the graph without it, with 6 degrees of freedom if all
+    /// covariances are right. `INFINITY` if a node does not exist.
     pub fn innovation(&mut self, edge: &LoopEdge) -> f64 {
         let Some((predicted, covariance)) = self.relative(edge.from, edge.to) else {
             return f64::INFINITY;
@@ -135,7 +135,7 @@ impl PoseGraph {
             .map_or(f64::INFINITY, |total| residual.dot(&total.solve(&residual)))
     }
 
-    /// Adds a loop closure. An edge between nodes that do not exist in this order is left out.
+    /// Adds a loop closure. An edge between nodes that do not exist in this order is ignored.
     pub fn close(&mut self, edge: LoopEdge) {
         if edge.from >= edge.to || edge.to >= self.map_from_nodes.len() {
             return;
@@ -162,15 +162,15 @@ impl PoseGraph {
         self.loops.push(edge);
     }
 
-    /// Removes the loop closures for which a test fails.
+    /// Keeps the loop closures that pass a test.
     pub fn retain(&mut self, is_kept: impl FnMut(&LoopEdge) -> bool) {
         self.loops.retain(is_kept);
         self.solved = None;
     }
 
-    /// Moves all nodes to the least squares of motions and loop closures. The first node stays.
+    /// Optimizes the poses by least squares over motions and loop closures. The first node is fixed.
     ///
-    /// False if the loop closures have no common solution; the poses are then those before.
+    /// Returns false, with unchanged poses, if the loop closures have no common solution.
     pub fn optimize(&mut self) -> bool {
         if self.loops.is_empty() {
             return true;
@@ -193,7 +193,7 @@ impl PoseGraph {
         true
     }
 
-    /// Squared Mahalanobis distance of each loop closure from the poses as they are.
+    /// Squared Mahalanobis distance of each loop closure at the current poses.
     pub fn residuals(&self) -> Vec<f64> {
         let distance = |edge: &LoopEdge| {
             let residual = self.residual(edge);
@@ -206,7 +206,7 @@ impl PoseGraph {
         self.loops.iter().map(distance).collect()
     }
 
-    /// One step of Gauss-Newton, and its largest change; `None` without a solution.
+    /// Gauss-Newton step, and its largest change; `None` without a solution.
     fn step(&mut self, solved: &mut Linearization) -> Option<f64> {
         // Deviation of each motion from its measurement, as a twist in the map.
         let deviations: Vec<Vector6<f64>> = (self.motions.iter())
@@ -258,7 +258,7 @@ impl PoseGraph {
         largest.is_finite().then_some(largest)
     }
 
-    /// Twist in the map that would move the later node of a loop closure to where the closure has it.
+    /// Twist in the map that moves the later node of a loop closure to its measured pose.
     fn residual(&self, edge: &LoopEdge) -> Vector6<f64> {
         let poses = &self.map_from_nodes;
         match (poses.get(edge.from), poses.get(edge.to)) {
@@ -267,7 +267,7 @@ impl PoseGraph {
         }
     }
 
-    /// Covariance of a twist in the frame of a node, in the map.
+    /// Transforms the covariance of a twist from the frame of a node to the map.
     fn in_map(&self, node: usize, covariance: &Matrix6<f64>) -> Matrix6<f64> {
         let adjoint = self.map_from_nodes.get(node).map(se3::adjoint);
         adjoint.map_or_else(Matrix6::identity, |adjoint| {
@@ -303,13 +303,13 @@ impl PoseGraph {
 }
 
 impl Linearization {
-    /// Covariance between the ends of a span.
+    /// Covariance between both ends of a span.
     fn between(&self, span: &Range<usize>) -> Matrix6<f64> {
         difference(&self.covariances, span).unwrap_or_else(Matrix6::zeros)
     }
 }
 
-/// Sums before each element and after the last.
+/// Cumulative sums: before each element and after the last.
 fn cumulative<T: Copy + std::ops::Add<Output = T>>(
     values: impl Iterator<Item = T>,
     zero: T,
@@ -323,7 +323,7 @@ fn cumulative<T: Copy + std::ops::Add<Output = T>>(
     sums
 }
 
-/// Sum over a span of what `cumulative` has summed.
+/// Sum over a span of cumulative sums.
 fn difference<T: Copy + std::ops::Sub<Output = T>>(sums: &[T], span: &Range<usize>) -> Option<T> {
     (span.start < span.end)
         .then(|| Some(*sums.get(span.end)? - *sums.get(span.start)?))

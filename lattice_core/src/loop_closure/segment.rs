@@ -5,12 +5,12 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 use crate::lattice::{Lattice, LatticeError, LatticeKind};
 use crate::odometry::{MomentMap, ScanResult, Verdict};
 
-/// Length of a segment in root mean squares of the distances of its points: neighbours see the same surfaces.
+/// Length of a segment in RMS ranges of its points: neighbours see the same surfaces.
 const LENGTH_ARMS: f64 = 0.5;
-/// Cells of a segment.
+/// Limit of cells of a segment.
 const MAX_CELLS: usize = 30_000;
 
-/// The surfaces that the scans of a stretch have seen, in the frame of the base at the first of them.
+/// Surfaces seen along a part of the path, in the frame of the base at its first scan (the anchor).
 #[derive(Clone, Debug)]
 pub struct Segment {
     /// Number of the submap of the odometry.
@@ -23,20 +23,20 @@ pub struct Segment {
     pub(super) end_ns: i64,
     /// Length of the path up to the first scan, m.
     pub(super) path_m: f64,
-    /// Pose of the first scan by odometry.
+    /// Odometry pose of the first scan.
     pub(super) odom_from_anchor: Isometry3<f64>,
-    /// Covariance of the twist of that pose in `odom` since the beginning of the submap.
+    /// Covariance of the twist of that pose in the odometry frame since the beginning of the submap.
     pub(super) drift: Matrix6<f64>,
     /// Centroids of cells, metres, in the frame of the anchor.
     pub(super) points_m: Vec<[f32; 3]>,
-    /// Root mean square of the distances of the points of its scans, m.
+    /// RMS range of the points of its scans, m.
     pub(super) arm_m: f64,
     /// Side of the cells, m.
     pub(super) side_m: f64,
 }
 
 impl Segment {
-    /// The points in the frame to which a pose of the anchor leads.
+    /// Points transformed by a pose of the anchor.
     pub(super) fn points_at<'a>(
         &'a self,
         pose: &'a Isometry3<f64>,
@@ -46,7 +46,7 @@ impl Segment {
     }
 }
 
-/// Cuts the scans of a drive into segments.
+/// Divides the scans of a drive into segments.
 #[derive(Default)]
 pub struct SegmentCutter {
     growing: Option<GrowingSegment>,
@@ -55,10 +55,11 @@ pub struct SegmentCutter {
 }
 
 impl SegmentCutter {
-    /// Takes a scan with its centroids, metres in the frame of the base at its pose, of cells of `side_m`; gives the segment that
-    /// ends before it. Scans that are not `OK` are passed over.
+    /// Adds a scan with its centroids, metres in the frame of the base at its pose, of cells of `side_m`. Returns the
+    /// segment that ends before it. Scans that are not `OK` are skipped.
     ///
-    /// Fails if `side_m` gives no lattice.
+    /// # Errors
+    /// If `side_m` gives no lattice.
     pub fn add(
         &mut self,
         scan: &ScanResult,
@@ -82,22 +83,23 @@ impl SegmentCutter {
         Ok(ended)
     }
 
-    /// The last segment, as it is.
+    /// Current segment so far.
     pub fn finish(&mut self) -> Option<Segment> {
         self.growing.take().map(GrowingSegment::finish)
     }
 }
 
-/// A segment that still grows.
+/// Segment under construction.
 struct GrowingSegment {
     segment: Segment,
     cells: MomentMap,
 }
 
 impl GrowingSegment {
-    /// A segment that a scan begins. `centroids_m`: in the frame of the base at the pose of the scan.
+    /// Begins a segment with a scan. `centroids_m`: in the frame of the base at the pose of the scan.
     ///
-    /// Fails if `side_m` gives no lattice.
+    /// # Errors
+    /// If `side_m` gives no lattice.
     fn new(
         scan: &ScanResult,
         centroids_m: &[Vector3<f64>],
@@ -126,7 +128,7 @@ impl GrowingSegment {
         Ok(growing)
     }
 
-    /// True if a scan is of another submap or beyond the end of the segment.
+    /// True if a scan belongs to another submap or lies beyond the end of the segment.
     fn is_ended_by(&self, scan: &ScanResult) -> bool {
         let Segment {
             submap,
@@ -149,7 +151,7 @@ impl GrowingSegment {
         self.cells.add(&placed);
     }
 
-    /// The segment as it is.
+    /// Segment so far.
     fn finish(self) -> Segment {
         let point = |point: &Vector3<f64>| [point.x as f32, point.y as f32, point.z as f32];
         Segment {
@@ -159,7 +161,8 @@ impl GrowingSegment {
     }
 }
 
-/// Covariance of a perturbation (translation, rotation) about a place as that of a twist about the origin of the same axes.
+/// Converts the covariance of a perturbation (translation, rotation) about a point to that of a twist about the
+/// origin of the same axes.
 pub(super) fn about_origin(covariance: &Matrix6<f64>, place_m: &Vector3<f64>) -> Matrix6<f64> {
     let mut to_origin = Matrix6::identity();
     let lever: Matrix3<f64> = place_m.cross_matrix();

@@ -11,26 +11,27 @@ use crate::registration::{
     Verdict, register_global,
 };
 
-/// Limit of the points of a cloud.
+/// Limit of points of a cloud.
 const MAX_POINTS: usize = 200_000;
-/// Least standard deviation of the tilt between two segments, rad: that of a registration.
+/// Lower bound of the standard deviation of the tilt between two segments, rad: that of a registration.
 const TILT_SIGMA_RAD: f64 = 0.02;
 
 /// Segments with the poses of their anchors in the map.
 pub(super) type Placed<'a> = &'a [(&'a Segment, Isometry3<f64>)];
 
-/// A registration of segments in earlier ones.
+/// Registration of segments against earlier ones.
 pub(super) struct Verified {
     pub verdict: Verdict,
     /// Reason for the verdict.
     pub reason: String,
-    /// Pose of the anchor of the source in the frame of that of the target.
+    /// `target_from_source` between the anchors of both.
     pub target_from_source: Isometry3<f64>,
-    /// Covariance of its twist in the frame of the target.
+    /// Covariance of its twist in the target frame.
     pub covariance: Matrix6<f64>,
 }
 
-/// Registers segments, the first of which is the source, in the segments of the target, without its pose as a guess.
+/// Registers segments, the first of which is the source, against the segments of the target, without an initial
+/// guess.
 ///
 /// `tilt_sigma_rad`: standard deviation of the tilt between both. `None` if there are too few points.
 pub(super) fn register_segments(
@@ -70,17 +71,17 @@ pub(super) fn register_segments(
     })
 }
 
-/// The rotation of a pose.
+/// Rotation of a pose.
 fn turn(pose: &Isometry3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(Vector3::zeros().into(), pose.rotation)
 }
 
-/// The frame at a pose with the axes of the map, as a pose.
+/// Pose with the same position and the axes of the map.
 fn level(pose: &Isometry3<f64>) -> Isometry3<f64> {
     Isometry3::translation(pose.translation.x, pose.translation.y, pose.translation.z)
 }
 
-/// The cells of segments in a frame, given by its pose in the map.
+/// Cells of segments in a frame, given by its pose in the map.
 fn cloud_of(
     segments: Placed,
     map_from_frame: &Isometry3<f64>,

@@ -91,7 +91,7 @@ impl Grid {
         Ok(grid)
     }
 
-    /// Position of the corner in the map frame, metres: multiples of the resolution.
+    /// Position of the lower-left corner of the first cell in the map frame, metres: multiples of the resolution.
     pub fn origin_m(&self) -> [f64; 2] {
         self.corner.map(|i| f64::from(i) * self.resolution_m)
     }

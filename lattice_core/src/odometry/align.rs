@@ -8,13 +8,13 @@ use rayon::prelude::*;
 use super::moment_map::MomentMap;
 use super::verdict::WeakDirection;
 
-/// Points of one task; sums of tasks are added in order, so that threads change no bit.
+/// Number of points per task. Sums of tasks are added in order, so results do not depend on threads.
 const CHUNK: usize = 256;
 const MAX_ITERATIONS: usize = 30;
-/// Steps below these end the iterations.
+/// Step sizes below which the iterations end.
 const DONE_M: f64 = 1e-3;
 const DONE_RAD: f64 = 1e-4;
-/// Neighbouring points whose costs are added before they are compared: they lie in one cell.
+/// Number of neighbouring points with summed costs: they lie in one cell.
 const GROUP: usize = 8;
 /// Scale of the Geman-McClure kernel on the Mahalanobis distance.
 const KERNEL: f64 = 3.0;
@@ -28,10 +28,10 @@ struct Equations {
     weight: f64,
 }
 
-/// Motions that planes show (translation, rotation about the base, axes of the map): sums over points on planes.
+/// Observability of motions (translation, rotation about the base, axes of the map): sums over points on planes.
 #[derive(Clone, Debug)]
 pub(super) struct Geometry {
-    /// Squared displacement along normals, less what the uncertainty of normals adds.
+    /// Squared displacement along normals, minus the contribution of the uncertainty of the normals.
     observed: Matrix6<f64>,
     /// Squared displacement.
     displaced: Matrix6<f64>,
@@ -60,18 +60,19 @@ impl Equations {
     }
 }
 
-/// A scan in the map.
+/// Registered scan.
 #[derive(Clone, Debug)]
 pub(super) struct Alignment {
     pub map_from_base: Isometry3<f64>,
-    /// Of a perturbation (translation, rotation) in the axes of the map about the base, m and rad.
+    /// Information of a perturbation (translation, rotation) about the base, in the axes of the map, m and rad.
     pub information: Matrix6<f64>,
     pub geometry: Geometry,
-    /// Part of the points that the map explains.
+    /// Inlier fraction of the points.
     pub overlap: f64,
 }
 
-/// Moves points (base frame, metres) onto the map from a guess; the motions `held` stay as in the guess.
+/// Registers points (base frame, metres) to the map from a guess; the pose stays as in the guess along the motions
+/// `held`.
 pub(super) fn align(
     map: &MomentMap,
     points_m: &[Vector3<f64>],
@@ -105,11 +106,11 @@ pub(super) fn align(
     }
 }
 
-/// Standard deviations by which the planes of the map explain points (base frame, metres) better at a pose than at that
-/// pose moved by a motion, and by its opposite: the smaller of the two.
+/// Contrast of a motion: standard deviations by which the planes of the map explain points (base frame, metres)
+/// better at a pose than at the pose moved by the motion, and by its opposite. The smaller of both is returned.
 ///
-/// Only points that lie on planes at both poses are compared. Where the map does not show the motion, differences of the
-/// costs are negative as often as positive. Their spread is therefore taken from the negative ones.
+/// Only points that lie on planes at both poses are compared. If the map does not constrain the motion, differences
+/// of the costs are negative as often as positive. Their spread is therefore estimated from the negative ones.
 pub(super) fn contrast(
     map: &MomentMap,
     points_m: &[Vector3<f64>],
@@ -156,7 +157,7 @@ fn plane_cost(map: &MomentMap, moved: &Vector3<f64>, gate_m: f64) -> Option<f64>
     Some(KERNEL * KERNEL * square / (KERNEL * KERNEL + square))
 }
 
-/// A pose moved by (translation, rotation) in the axes of the map about the base.
+/// Pose perturbed by (translation, rotation) in the axes of the map about the base.
 pub(super) fn perturbed(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_scaled_axis(step.fixed_rows::<3>(3).into_owned());
     Isometry3::from_parts(
@@ -243,7 +244,7 @@ fn sandwiched(m: &Matrix3<f64>, cross: &Matrix3<f64>) -> Matrix6<f64> {
     all
 }
 
-/// Motions that a solution leaves as in the guess.
+/// Motions along which a solution stays at the guess.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Held {
     motions: Vec<Vector6<f64>>,
@@ -262,7 +263,7 @@ impl Held {
 }
 
 impl Geometry {
-    /// Six independent motions with the part of the displacements that planes show, weakest first.
+    /// Six independent motions with their observed fractions, weakest first.
     ///
     /// Eigenvectors of `observed` relative to `displaced`.
     pub fn directions(&self) -> Vec<WeakDirection> {
@@ -289,12 +290,12 @@ impl Geometry {
         directions
     }
 
-    /// Factor that makes a motion of [`Geometry::directions`] one of 1 m in the root mean square over points.
+    /// Factor that scales a motion of [`Geometry::directions`] to an RMS displacement of 1 m.
     pub fn per_meter(&self) -> f64 {
         self.displaced[(0, 0)].max(0.0).sqrt()
     }
 
-    /// Holds directions that are weak here.
+    /// Fixes the directions that are weak here.
     pub fn hold(&self, weak: &[WeakDirection]) -> Held {
         Held {
             motions: weak.iter().map(|weak| weak.motion).collect(),

@@ -33,8 +33,8 @@ use submap::Submap;
 use sweep::Sweep;
 use verdict::{Evidence, can_begin, judge, least_contrast};
 
-/// Registrations of a scan, each deskewed by the velocity that the one before found: usually, and where the map explains
-/// less of it than usual.
+/// Number of registrations of a scan, each deskewed by the velocity of the one before: usually, and if the inlier
+/// fraction is low.
 const PASSES: (usize, usize) = (2, 4);
 
 /// Options of the odometry.
@@ -52,19 +52,19 @@ impl Default for OdometryOptions {
     }
 }
 
-/// A scan in the frame of the base.
+/// Scan in the frame of the base.
 #[derive(Clone, Copy, Debug)]
 pub struct Scan<'a> {
     /// Points, metres.
     pub points_m: &'a [Vector3<f64>],
-    /// Time of each point, nanoseconds; `None`: all at the stamp.
+    /// Time of each point, ns; `None` if all are measured at the stamp.
     pub times_ns: Option<&'a [i64]>,
-    /// Stamp, nanoseconds.
+    /// Stamp, ns.
     pub stamp_ns: i64,
 }
 
 impl Scan<'_> {
-    /// Times of the first and the last point; the stamp without times.
+    /// Times of the first and the last point, ns; the stamp without times.
     pub fn span_ns(&self) -> (i64, i64) {
         let times = self.times_ns.into_iter().flatten().copied();
         let known = times.filter(|time| *time != NO_TIME_NS);
@@ -76,38 +76,38 @@ impl Scan<'_> {
     }
 }
 
-/// The pose of a scan.
+/// Result for a scan.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ScanResult {
-    /// Time of the first point, nanoseconds.
+    /// Time of the first point, ns.
     pub first_ns: i64,
     /// Pose of the base at that time.
     pub odom_from_first: Isometry3<f64>,
-    /// Time of the last point, nanoseconds.
+    /// Time of the last point, ns.
     pub end_ns: i64,
     /// Pose of the base at that time.
     pub odom_from_base: Isometry3<f64>,
     /// Covariance of a perturbation (translation, rotation) in the axes of `odom` about the base since the beginning of
     /// the submap, m^2, m rad and rad^2.
     pub covariance: Matrix6<f64>,
-    /// The part of it that grows along the path: the covariance of the place of the map around the base.
+    /// Part of the covariance that grows along the path: that of the pose of the map around the base.
     pub drift: Matrix6<f64>,
-    /// Verdict.
+    /// Verdict on the pose.
     pub verdict: Verdict,
-    /// Number of the submap, from 0. Poses of two submaps are not known to each other.
+    /// Number of the submap, from 0. The relative pose of two submaps is unknown.
     pub submap: u32,
-    /// Part of the registered points that the map explains.
+    /// Inlier fraction of the registered points.
     pub overlap: f64,
-    /// Points that were registered.
+    /// Number of registered points.
     pub points: usize,
-    /// Standard deviations by which the map explains the scan better than at a cell's side from its pose, in the weakest
-    /// direction.
+    /// Contrast of the weakest direction: standard deviations by which the map explains the scan better at its pose
+    /// than a cell size away.
     pub contrast: f64,
 }
 
 impl ScanResult {
-    /// The same with the pose at the time of the first point.
+    /// Result with the pose at the time of the first point.
     pub fn at_first(&self) -> ScanResult {
         ScanResult {
             end_ns: self.first_ns,
@@ -117,7 +117,7 @@ impl ScanResult {
     }
 }
 
-/// Odometry by scans.
+/// Lidar odometry: registers each scan against a map of the scans before.
 #[derive(Clone)]
 pub struct Odometry {
     options: OdometryOptions,
@@ -126,7 +126,7 @@ pub struct Odometry {
 }
 
 impl Odometry {
-    /// Odometry that has seen nothing.
+    /// Creates an odometry without a map.
     pub fn new(options: OdometryOptions) -> Odometry {
         Odometry {
             options,
@@ -135,9 +135,10 @@ impl Odometry {
         }
     }
 
-    /// The pose of a scan. Scans come in the order of time.
+    /// Registers the next scan, in order of time.
     ///
-    /// Fails if the options give no lattice.
+    /// # Errors
+    /// If the options give no lattice.
     pub fn register(&mut self, scan: &Scan, prior: &Prior) -> Result<ScanResult, LatticeError> {
         let kind = self.options.lattice;
         let (first_ns, end_ns) = scan.span_ns();
@@ -202,7 +203,7 @@ impl Odometry {
         Ok(ScanResult { contrast, ..result })
     }
 
-    /// Begins a submap with a scan, where the motion of the one before leads.
+    /// Begins a submap with a scan, at the pose predicted from the submap before.
     fn begin(&mut self, scan: &Scan, prior: &Prior) -> Result<ScanResult, LatticeError> {
         let kind = self.options.lattice;
         let (first_ns, end_ns) = scan.span_ns();
@@ -245,17 +246,17 @@ impl Odometry {
         Ok(result)
     }
 
-    /// The map of the scans before.
+    /// Map of the scans of the submap.
     pub fn map(&self) -> Option<&MomentMap> {
         self.submap.as_ref().map(|submap| &submap.map)
     }
 
-    /// Centroids of the cells of the last scan, deskewed, metres in the frame of the base at the end of the scan.
+    /// Centroids of the cells of the last scan, deskewed, metres, in the frame of the base at the end of the scan.
     pub fn centroids_m(&self) -> &[Vector3<f64>] {
         &self.centroids_m
     }
 
-    /// Sizes of cells in use.
+    /// Current cell sizes.
     pub fn sizes(&self) -> Option<Sizes> {
         self.submap.as_ref().map(|submap| submap.sizes)
     }

@@ -15,7 +15,7 @@ struct Cell {
     code: u64,
     index: LatticeIndex,
     moments: Moments,
-    /// Made when it is first asked for after a change.
+    /// Surface, computed at the first query after a change.
     surface: OnceLock<Surface>,
 }
 
@@ -25,10 +25,10 @@ impl Row for Cell {
     }
 }
 
-/// The cells of a lattice that hold points, each with count, sums and second moments.
+/// Occupied cells of a lattice, each with count, sums and second moments of its points.
 ///
-/// All sums are integers: neither the order of points nor the number of threads changes a bit, and a cloud that was
-/// added is taken out exactly.
+/// All sums are integers: results do not depend on the order of points or the number of threads, and subtraction is
+/// exact.
 #[derive(Clone)]
 pub struct MomentMap {
     lattice: Lattice,
@@ -37,7 +37,7 @@ pub struct MomentMap {
 }
 
 impl MomentMap {
-    /// A map without points that holds at most `max_cells`; points of further cells are left out.
+    /// Creates a map of at most `max_cells` cells; points of further cells are ignored.
     pub fn new(lattice: Lattice, max_cells: usize) -> MomentMap {
         MomentMap {
             lattice,
@@ -46,7 +46,7 @@ impl MomentMap {
         }
     }
 
-    /// The lattice.
+    /// Lattice of the map.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
@@ -56,7 +56,7 @@ impl MomentMap {
         self.cells.len()
     }
 
-    /// True if no point was added, or all were taken out.
+    /// True if the map has no points.
     pub fn is_empty(&self) -> bool {
         self.cells.len() == 0
     }
@@ -68,7 +68,7 @@ impl MomentMap {
         }
     }
 
-    /// Lets surfaces be made anew from their cells and those around them. To be called after points have changed.
+    /// Discards cached surfaces of the changed cells and their neighbours. To be called after points have changed.
     pub(super) fn renew_surfaces(&mut self) {
         for number in 0..self.cells.len() as u32 {
             if let Some(cell) = self.cells.row_mut(number) {
@@ -77,7 +77,7 @@ impl MomentMap {
         }
     }
 
-    /// Takes out points that were added, metres.
+    /// Subtracts points that were added before, metres.
     pub fn subtract(&mut self, points_m: &[Vector3<f64>]) {
         for point in points_m {
             self.change(point, -1);
@@ -118,7 +118,7 @@ impl MomentMap {
         Some(&self.cell(code)?.moments)
     }
 
-    /// All cells by lattice index, in ascending order.
+    /// Cells by lattice index, in ascending order.
     pub fn sorted(&self) -> Vec<(LatticeIndex, Moments)> {
         let mut all: Vec<_> = (self.cells.rows().iter())
             .map(|cell| (cell.index, cell.moments))
@@ -127,7 +127,7 @@ impl MomentMap {
         all
     }
 
-    /// Centroids of all cells in the order in which they came, metres.
+    /// Centroids of all cells in the order of their creation, metres.
     pub fn centroids_m(&self) -> Vec<Vector3<f64>> {
         let cells = self.cells.rows().par_iter();
         cells
@@ -147,7 +147,7 @@ impl MomentMap {
         }
     }
 
-    /// The surface of a cell, with the points of the cells around it where its own show no plane.
+    /// Surface of a cell, with the points of its neighbours if its own show no plane.
     fn surface_of(&self, cell: &Cell) -> Surface {
         let (center, side_m) = (self.lattice.center(cell.index), self.lattice.cell_side_m());
         let own = Surface::of(&cell.moments, &center, side_m);
@@ -170,8 +170,8 @@ impl MomentMap {
         self.cells.rows().get(self.cells.find(code)? as usize)
     }
 
-    /// The surface with the centroid nearest to a point, of its cell and the cells that share a face with it, within
-    /// `gate_m`.
+    /// Surface with the nearest centroid to a point within `gate_m`, among its cell and the cells that share a face
+    /// with it.
     pub(super) fn nearest(&self, point: &Vector3<f64>, gate_m: f64) -> Option<&Surface> {
         let index = self.lattice.quantize(point)?;
         let mut best = (gate_m * gate_m, None);

@@ -12,7 +12,7 @@ const UNIT_M: f64 = 1e-3;
 pub struct Moments {
     count: i64,
     sums: [i64; 3],
-    /// xx, yy, zz, xy, xz, yz.
+    /// Second moments xx, yy, zz, xy, xz, yz.
     products: [i64; 6],
 }
 
@@ -32,13 +32,13 @@ impl Moments {
         self.count
     }
 
-    /// The centroid as an offset from the centre of the cell, metres; zero without points.
+    /// Centroid relative to the centre of the cell, metres; zero without points.
     pub fn mean_m(&self) -> Vector3<f64> {
         let scale = UNIT_M / self.count.max(1) as f64;
         Vector3::from(self.sums.map(|sum| sum as f64 * scale))
     }
 
-    /// The covariance about the centroid, m^2; zero without points.
+    /// Covariance about the centroid, m^2; zero without points.
     pub fn covariance_m2(&self) -> Matrix3<f64> {
         let scale = UNIT_M * UNIT_M / self.count.max(1) as f64;
         let [xx, yy, zz, xy, xz, yz] = self.products.map(|product| product as f64 * scale);
@@ -46,7 +46,7 @@ impl Moments {
         Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) - mean * mean.transpose()
     }
 
-    /// The moments about another place: offsets are longer by `shift_m`, which is rounded to mm.
+    /// Moments about another point: offsets grow by `shift_m`, rounded to mm.
     pub(super) fn about(&self, shift_m: &Vector3<f64>) -> Moments {
         let [x, y, z] = [0, 1, 2].map(|i| (shift_m[i] / UNIT_M).round() as i64);
         let [a, b, c] = self.sums;
@@ -66,7 +66,7 @@ impl Moments {
         }
     }
 
-    /// The moments with `sign` times those of `other`.
+    /// Adds `sign` times the moments of `other`.
     pub(super) fn add(&mut self, other: &Moments, sign: i64) {
         self.count += sign * other.count;
         for (to, from) in self.sums.iter_mut().zip(other.sums) {

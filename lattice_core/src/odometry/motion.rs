@@ -5,32 +5,32 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Vector6};
 use super::sweep::{AngularRate, turn};
 use crate::pose::se3;
 
-/// Standard deviation of predictions at the beginning, metres.
+/// Initial standard deviation of predictions, metres.
 const FIRST_DEVIATION_M: f64 = 2.0;
-/// Deviations below this do not narrow the gate, metres.
+/// Deviation below which the gate does not narrow, metres.
 const LEAST_DEVIATION_M: f64 = 0.1;
-/// Floor of the deviation of one scan's prediction along weak directions: noise of a pose, metres.
+/// Lower bound of the deviation of a prediction along weak directions, by the noise of a pose, metres.
 const POSE_NOISE_M: f64 = 0.01;
-/// Weight of the newest deviation in their mean: about the last 20.
+/// Weight of the newest deviation in the mean, which thus covers some 20.
 const NEWEST: f64 = 0.05;
-/// Error of a motion that wheels give, as a part of its length.
+/// Error of the motion by wheels, as a fraction of its length.
 const WHEEL_ERROR: f64 = 0.05;
 
 /// Measured motion since the scan before.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Prior<'a> {
-    /// Motion of the base from the end of the scan before to the end of this one, as of wheels: `before_from_now`.
+    /// Motion of the base from the end of the previous scan to the end of this one, as by wheels: `before_from_now`.
     pub motion: Option<Isometry3<f64>>,
-    /// Samples of a gyroscope from the end of the scan before to the end of this one, in order of time.
+    /// Gyroscope samples from the end of the previous scan to the end of this one, in order of time.
     pub rates: &'a [AngularRate],
 }
 
-/// Constant velocity with the deviations from it.
+/// Constant-velocity prediction with its deviations.
 #[derive(Clone, Debug)]
 pub(super) struct Motion {
-    /// In the base frame, m/s and rad/s; `None` before two scans were registered.
+    /// Velocity in the base frame, m/s and rad/s; `None` before two scans were registered.
     velocity: Option<Vector6<f64>>,
-    /// Sum and number of squared deviations that make the gate.
+    /// Sum and number of squared deviations that determine the gate.
     squares: f64,
     count: f64,
     /// Mean of all squared deviations.
@@ -41,7 +41,7 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// Unknown motion.
+    /// Unknown velocity.
     pub fn unknown() -> Motion {
         Motion {
             velocity: None,
@@ -73,12 +73,12 @@ impl Motion {
         motion
     }
 
-    /// Largest distance of corresponding points: three standard deviations of predictions, metres.
+    /// Gate: maximum distance of correspondences, three standard deviations of predictions, metres.
     pub fn gate_m(&self) -> f64 {
         3.0 * (self.squares / self.count).sqrt()
     }
 
-    /// Takes the motion that registration found.
+    /// Updates the velocity by the motion that registration found.
     pub fn update(
         &mut self,
         found: &Isometry3<f64>,
@@ -101,8 +101,8 @@ impl Motion {
         }
     }
 
-    /// Adds the uncertainty of a predicted motion along weak directions, and gives three standard deviations of the
-    /// position, metres: infinite if the velocity is unknown.
+    /// Adds the uncertainty of a predicted motion along weak directions. Returns three standard deviations of the
+    /// position, metres; `INFINITY` if the velocity is unknown.
     pub fn add_weak(&mut self, motion: &Isometry3<f64>, prior: &Prior) -> f64 {
         let step_m = match (prior.motion, self.velocity) {
             (Some(_), _) => WHEEL_ERROR * motion.translation.vector.norm(),
@@ -116,7 +116,7 @@ impl Motion {
         3.0 * self.weak_m
     }
 
-    /// Ends a stretch of weak scans: the map holds the pose again.
+    /// Ends a sequence of weak scans: the map constrains the pose again.
     pub fn end_weak(&mut self) {
         (self.weak_step_m, self.weak_m) = (0.0, 0.0);
     }
@@ -131,7 +131,8 @@ pub(super) fn seconds(from_ns: i64, to_ns: i64) -> f64 {
     to_ns.saturating_sub(from_ns) as f64 * 1e-9
 }
 
-/// Covariance of a pose carried along a displacement (axes of the map, metres): errors of rotation move it.
+/// Propagates the covariance of a pose along a displacement (axes of the map, metres): errors of rotation change the
+/// position.
 pub(super) fn carried(
     covariance: &Matrix6<f64>,
     displacement_m: &nalgebra::Vector3<f64>,

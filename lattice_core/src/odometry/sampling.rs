@@ -7,28 +7,28 @@ use nalgebra::Vector3;
 use super::moment_map::MomentMap;
 use crate::lattice::{Lattice, LatticeError, LatticeKind};
 
-/// Side of the map's cells in mean distances of the returns of a scan: beams lie two to four times that apart, and a
-/// plane needs returns of more than one.
+/// Cell size of the map in mean distances between returns: beams are two to four times as far apart, and a plane
+/// needs returns of more than one.
 const SIDE_SPACINGS: f64 = 8.0;
-/// Bounds of the side, metres: below, noise of ranges makes planes thick; above, cells hold several surfaces. With 1.5 m
-/// for 1 m at most, twice as many points of a street with moving cars lie on planes across it.
+/// Bounds of the cell size, metres: below, range noise thickens planes; above, cells hold several surfaces. An upper
+/// bound of 1.5 m instead of 1 m doubles the points of a street with moving cars on planes across it.
 const SIDES_M: (f64, f64) = (0.3, 1.5);
-/// Centroids for the map, at least and at most: a cell of the map gets some of each scan.
+/// Bounds of the number of centroids for the map: each cell of the map should get some from each scan.
 const CENTROIDS: (usize, usize) = (3000, 8000);
-/// Limits of the number of points for registration.
+/// Bounds of the number of points for registration.
 const REGISTERED: (usize, usize) = (1000, 2500);
-/// Steps between two sizes: 2^(1/4).
+/// Ratio of consecutive sizes: 2^(1/4).
 const STEP: f64 = 1.189_207_115;
 const MAX_STEPS: u32 = 12;
 
 /// Cell sizes of a scan and of its map, cube roots of volumes, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sizes {
-    /// Of the map.
+    /// Cell size of the map.
     pub map_m: f64,
-    /// Of the centroids that go into the map.
+    /// Cell size of the centroids added to the map.
     pub centroids_m: f64,
-    /// Of the points that are registered.
+    /// Cell size of the registered points.
     pub registered_m: f64,
 }
 
@@ -36,13 +36,14 @@ pub struct Sizes {
 pub(super) struct Sample {
     pub centroids_m: Vec<Vector3<f64>>,
     pub registered_m: Vec<Vector3<f64>>,
-    /// Root mean square of the distances of the registered points.
+    /// RMS range of the registered points, metres.
     pub arm_m: f64,
 }
 
 impl Sizes {
-    /// Sizes for scans like this one (sensor near the origin, metres): the side of the map follows from the median range
-    /// and the number of returns, the others are half and one and a half of it or smaller, so that enough points remain.
+    /// Cell sizes for scans like this one (sensor near the origin, metres). That of the map follows from the median
+    /// range and the number of returns; the others are half and one and a half of it, or smaller so that enough
+    /// points remain.
     pub fn of(points_m: &[Vector3<f64>], kind: LatticeKind) -> Result<Sizes, LatticeError> {
         let mut ranges: Vec<f64> = points_m.iter().map(Vector3::norm).collect();
         let middle = ranges.len() / 2;
@@ -68,7 +69,7 @@ impl Sizes {
         Ok(sizes)
     }
 
-    /// Steps to smaller or larger samples where a scan gave too few or too many points.
+    /// Changes the sample sizes if a scan gave too few or too many points.
     pub(super) fn follow(&mut self, sample: &Sample) {
         let step = |size: f64, count: usize, (least, most): (usize, usize), bound: f64| {
             if count < least {
@@ -90,7 +91,7 @@ impl Sizes {
         self.registered_m = self.registered_m.max(self.centroids_m);
     }
 
-    /// Centroids of the cells of a scan, and one of them for each larger cell.
+    /// Centroids of the cells of a scan, and one of them per larger cell.
     pub(super) fn sample(
         &self,
         points_m: &[Vector3<f64>],

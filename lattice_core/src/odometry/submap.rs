@@ -11,33 +11,34 @@ use super::verdict::{self, LostCause, Verdict, WeakDirection};
 use super::{Scan, ScanResult};
 use crate::lattice::{Lattice, LatticeError, LatticeKind};
 
-/// Cells of the map, at 400 bytes each.
+/// Limit of cells of the map, at 400 bytes each.
 const MAX_CELLS: usize = 500_000;
-/// Distance to which the map is kept, in largest distances of points of a scan.
+/// Distance within which the map is kept, in maximum ranges of a scan.
 const KEPT_RANGES: f64 = 1.5;
-/// Scans of a new map that are added wherever the base is.
+/// Number of scans of a new map that are added at any distance.
 const FIRST_SCANS: usize = 5;
-/// Distance from the place of a new map at which its verdicts count, metres: the first poses of a map lie within some
-/// centimetres where motion is not seen.
+/// Distance from the first pose of a map above which its verdicts count, metres: without observed motion, the first
+/// poses agree within some centimetres.
 const LEAVE_M: f64 = 0.3;
-/// Time between scans beyond which motion cannot be predicted, in seconds.
+/// Time between scans above which motion cannot be predicted, s.
 const MAX_GAP_S: f64 = 0.5;
-/// Time for which a lost scan is looked for in the map before a new submap begins, in seconds.
+/// Time for which a lost scan is searched in the map before a new submap begins, s.
 const RESUME_S: f64 = 1.0;
-/// Overlap of a map of one scan with the next one: beams of both lie between each other.
+/// Inlier fraction of the second scan in a map of one scan: its beams lie between those of the first.
 const FIRST_OVERLAP: f64 = 0.7;
-/// Part of the usual overlap below which a registration is tried from other guesses.
+/// Inlier fraction, relative to the usual one, below which a registration is repeated from other guesses.
 const SUSPICIOUS: f64 = 0.9;
-/// Weight of the newest overlap in its mean.
+/// Weight of the newest inlier fraction in the mean.
 const NEWEST: f64 = 0.1;
-/// Factor from the inverse of the information to the covariance: points of a cell share its errors.
+/// Factor from the inverse of the information to the covariance: errors of points in a cell are correlated.
 const CORRELATION: f64 = 100.0;
-/// Error that all surfaces of a map share, metres: as measured in simulated drives.
+/// Common error of all surfaces of a map, metres, as measured in simulated drives.
 const SURFACE_ERROR_M: f64 = 0.005;
-/// Part of the deviation from constant velocity that remains in the pose of a scan: it was deskewed by a constant one.
+/// Fraction of the deviation from constant velocity that remains in the pose of a scan, since it was deskewed by a
+/// constant one.
 const DESKEW_ERROR: f64 = 0.5;
 
-/// The map of the scans before and the motion in it.
+/// Map of the previous scans, and the motion in it.
 #[derive(Clone)]
 pub(super) struct Submap {
     pub number: u32,
@@ -46,20 +47,20 @@ pub(super) struct Submap {
     pub motion: Motion,
     pub end_ns: i64,
     pub odom_from_base: Isometry3<f64>,
-    /// Without that of the last registration.
+    /// Covariance without that of the last registration.
     pub covariance: Matrix6<f64>,
     pub usual_overlap: f64,
     pub scans: usize,
     /// Pose of the scan added last.
     pub added_at: Isometry3<f64>,
-    /// Place of the first scan until the machine has left it, metres.
+    /// Position of the first scan until the machine has left it, metres.
     pub only_place_m: Option<Vector3<f64>>,
     pub lost_since_ns: Option<i64>,
-    /// The first scan while it is the whole map.
+    /// First scan, while it is the whole map.
     pub first: Option<FirstScan>,
 }
 
-/// A scan that was added before its velocity was known.
+/// Scan added before its velocity was known.
 #[derive(Clone)]
 pub(super) struct FirstScan {
     pub points_m: Vec<Vector3<f64>>,
@@ -68,9 +69,10 @@ pub(super) struct FirstScan {
 }
 
 impl Submap {
-    /// A submap that a scan begins, still without its points.
+    /// Begins a submap at a scan, without its points.
     ///
-    /// Fails if the sizes give no lattice.
+    /// # Errors
+    /// If the sizes give no lattice.
     pub fn new(
         number: u32,
         scan: &Scan,
@@ -101,14 +103,14 @@ impl Submap {
         })
     }
 
-    /// True if a pose is at the only place from which the map was seen.
+    /// True if a pose is at the only position of the scans in the map.
     pub fn is_one_place(&self, pose: &Isometry3<f64>) -> bool {
         let is_near = |place: Vector3<f64>| (pose.translation.vector - place).norm() < LEAVE_M;
         self.only_place_m.is_some_and(is_near)
     }
 
-    /// Directions of motion in which the map explains a scan no better than at a pose one cell away, weakest first, and the
-    /// least contrast of those tried.
+    /// Weak directions: motions by a cell size after which the map explains a scan as well, weakest first; and the
+    /// smallest contrast of the tested ones.
     pub fn weak_directions(
         &self,
         sample: &Sample,
@@ -133,12 +135,12 @@ impl Submap {
         (weak.map(|(_, direction)| direction).collect(), smallest)
     }
 
-    /// True if the scan before was lost, or so long ago that motion cannot be predicted.
+    /// True if the previous scan was lost, or so long ago that motion cannot be predicted.
     pub fn is_lost(&self, end_ns: i64) -> bool {
         self.lost_since_ns.is_some() || seconds(self.end_ns, end_ns) > MAX_GAP_S
     }
 
-    /// True if a lost scan is not looked for in this map any more.
+    /// True if a lost scan is no longer searched in this map.
     pub fn is_given_up(&self, end_ns: i64) -> bool {
         let since = self.lost_since_ns;
         since.is_some_and(|since_ns| seconds(since_ns, end_ns) > RESUME_S)
@@ -154,13 +156,13 @@ impl Submap {
         }
     }
 
-    /// True if the map explains less of a scan than usual.
+    /// True if the inlier fraction of a scan is lower than usual.
     pub fn is_suspicious(&self, alignment: &Alignment) -> bool {
         alignment.overlap < SUSPICIOUS * self.usual_overlap
     }
 
-    /// The registration, from other guesses too where the first one gives a suspicious one: as a machine begins to turn,
-    /// far points are beyond the cells around their guess, and at the second scan the velocity is unknown.
+    /// Registers a scan, from other guesses too if the first result is suspicious: when a machine begins to turn, far
+    /// points lie beyond the cells around their guess, and at the second scan the velocity is unknown.
     pub fn align_around(&self, sample: &Sample, guess: &Isometry3<f64>) -> Alignment {
         let free = Held::default();
         let mut best = self.align(sample, guess, &free);
@@ -187,13 +189,13 @@ impl Submap {
         best
     }
 
-    /// The registration from a guess.
+    /// Registers a scan from a guess.
     pub fn align(&self, sample: &Sample, guess: &Isometry3<f64>, held: &Held) -> Alignment {
         let (points, gate_m) = (&sample.registered_m, self.motion.gate_m());
         align(&self.map, points, guess, gate_m, held)
     }
 
-    /// Makes the map anew from its only scan, deskewed by the velocity that the second one shows.
+    /// Rebuilds the map from its only scan, deskewed by the velocity found with the second one.
     pub fn deskew_first(
         &mut self,
         velocity: &Vector6<f64>,
@@ -211,7 +213,7 @@ impl Submap {
         Ok(())
     }
 
-    /// Takes a judged scan: pose, motion, covariance, and the map if it is certain.
+    /// Adds a judged scan: pose, motion, covariance, and the map if its pose is certain.
     pub fn follow(
         &mut self,
         (first_ns, end_ns): (i64, i64),
@@ -282,8 +284,8 @@ impl Submap {
         }
     }
 
-    /// True if points of the scan lie half a centroid's cell from where the last ones were added: an independent
-    /// observation. A base at rest adds nothing, so that its map does not creep.
+    /// True if the points of the scan lie half a centroid's cell from those added last, so that they are an
+    /// independent observation. A base at rest adds nothing, so its map does not drift.
     pub fn is_elsewhere(&self, arm_m: f64) -> bool {
         let apart = self.added_at.inverse() * self.odom_from_base;
         let moved_m = apart.translation.vector.norm() + arm_m * apart.rotation.angle();
@@ -308,14 +310,14 @@ impl Submap {
     }
 }
 
-/// Motion (translation, rotation) in the axes of the map about the base that leads from a pose to another.
+/// Motion (translation, rotation) from one pose to another, in the axes of the map about the base.
 fn between(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
     let moved = to.translation.vector - from.translation.vector;
     let turned = (to.rotation * from.rotation.inverse()).scaled_axis();
     Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z)
 }
 
-/// Covariance of one registration; along weak directions that of the prediction.
+/// Covariance of one registration; along weak directions, that of the prediction.
 fn covariance_of(
     alignment: &Alignment,
     weak_m: f64,

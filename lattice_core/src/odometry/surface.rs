@@ -4,20 +4,20 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::moments::Moments;
 
-/// Fewest points of a plane: two more than determine one and its thickness.
+/// Minimum number of points of a plane: two more than determine it and its thickness.
 const PLANE_POINTS: i64 = 6;
-/// A plane's smallest eigenvalue is below this part of the middle one.
+/// Ratio of the smallest to the middle eigenvalue below which points form a plane.
 const PLANE_FLATNESS: f64 = 0.1;
-/// Standard deviation of a return about a plane: noise of ranges and of poses, metres.
+/// Standard deviation of a return about a plane, by noise of ranges and poses, metres.
 const PLANE_NOISE_M: f64 = 0.03;
-/// Smallest standard deviation of a plane's points in both of its directions, metres: returns of one beam lie on a line
-/// as wide as their noise, and the plane through it is turned at random. Twice as much leaves out recesses of 0.15 m, by
-/// which a corridor shows motion along it.
+/// Minimum standard deviation of the points of a plane in both of its directions, metres: returns of one beam lie on
+/// a line as wide as their noise, and the plane through it has a random normal. Twice as much would exclude recesses
+/// of 0.15 m, which constrain motion along a corridor.
 const LEAST_WIDTH_M: f64 = PLANE_NOISE_M;
-/// Information along a plane, as a part of that of a point: where in the plane a centroid lies says little.
+/// Information along a plane, as a fraction of that of a point: the position of a centroid in its plane is arbitrary.
 const ALONG_PLANE: f64 = 0.05;
 
-/// A plane with the uncertainty of its normal.
+/// Plane with the uncertainty of its normal.
 #[derive(Clone, Debug)]
 pub(super) struct Plane {
     pub normal: Vector3<f64>,
@@ -39,7 +39,7 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// The surface of a cell with its centre and the cube root of its volume, metres.
+    /// Surface of a cell with its centre and cell size, metres.
     ///
     /// A plane has the information `n nᵀ / (λ0 + ε²)` across. A point that is anywhere in the cell has the variance
     /// `side² / 12` in each axis.
@@ -52,7 +52,7 @@ impl Surface {
         own.with_plane_of(moments, side_m)
     }
 
-    /// The surface with the orientation of a plane through points of it and around it, where they lie in one.
+    /// Surface with the orientation of a plane through its points and those around it, if they form one.
     pub fn with_plane_of(mut self, moments: &Moments, side_m: f64) -> Surface {
         if moments.count() < PLANE_POINTS {
             return self;

@@ -6,20 +6,20 @@ use rayon::prelude::*;
 use crate::cloud::NO_TIME_NS;
 use crate::pose::se3;
 
-/// Poses of a sweep. Between two of them points are interpolated, with an error of `range (angle / 16)² / 8`: 0.3 mm at
-/// 60 m and 0.1 rad.
+/// Number of poses of a sweep. Points are interpolated between them, with an error of `range (angle / 16)² / 8`: 0.3
+/// mm at 60 m and 0.1 rad.
 const STEPS: usize = 16;
 
-/// A sample of a gyroscope: angular rate in the base frame, rad/s.
+/// Sample of a gyroscope: angular rate in the base frame, rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AngularRate {
-    /// Time, nanoseconds.
+    /// Time, ns.
     pub stamp_ns: i64,
     /// Rate about the axes of the base, rad/s.
     pub rate_rad_per_s: Vector3<f64>,
 }
 
-/// Poses of the base during a scan, relative to that at its end.
+/// Poses of the base during a scan, relative to the pose at its end.
 pub(super) struct Sweep {
     first_ns: i64,
     step_ns: f64,
@@ -27,8 +27,8 @@ pub(super) struct Sweep {
 }
 
 impl Sweep {
-    /// A sweep at constant velocity (m/s and rad/s in the base frame); rotations are those of the gyroscope if there
-    /// are samples.
+    /// Sweep at constant velocity (m/s and rad/s in the base frame), with the rotations of the gyroscope if there are
+    /// samples.
     pub fn new(
         first_ns: i64,
         end_ns: i64,
@@ -52,12 +52,12 @@ impl Sweep {
         }
     }
 
-    /// Pose of the base at the beginning, in that at the end.
+    /// Pose of the base at the beginning, in the frame of the base at the end.
     pub fn first(&self) -> Isometry3<f64> {
         self.end_from_base.first().copied().unwrap_or_default()
     }
 
-    /// Points as seen from the end of the sweep, metres; without times, and for points without a time, as they are.
+    /// Points deskewed to the end of the sweep, metres; points without a time are unchanged.
     pub fn deskew(&self, points_m: &[Vector3<f64>], times_ns: Option<&[i64]>) -> Vec<Vector3<f64>> {
         let Some(times_ns) = times_ns.filter(|_| self.step_ns > 0.0) else {
             return points_m.to_vec();
@@ -87,7 +87,7 @@ impl Sweep {
     }
 }
 
-/// Rotation of the base from one time to another, by the samples between, each of which holds up to the next.
+/// Rotation of the base from one time to another by the samples between, each of which holds until the next.
 pub(super) fn turn(rates: &[AngularRate], from_ns: i64, to_ns: i64) -> UnitQuaternion<f64> {
     let mut turned = UnitQuaternion::identity();
     for (i, rate) in rates.iter().enumerate() {

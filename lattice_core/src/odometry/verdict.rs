@@ -4,61 +4,62 @@ use std::fmt;
 
 use nalgebra::Vector6;
 
-/// Fewest registered points of a pose.
+/// Minimum number of registered points.
 const MIN_POINTS: usize = 100;
-/// Part of the points that the map explains below which a pose is lost, absolute and of what is usual in the map.
+/// Inlier fraction below which a pose is lost: absolute, and relative to the usual fraction of the map.
 const MIN_OVERLAP: f64 = 0.2;
 const MIN_OF_USUAL: f64 = 0.65;
-/// Part of the usual overlap after which a lost scan is found again in the same map.
+/// Inlier fraction, relative to the usual one, above which a lost scan is localized again in the same map.
 const FOUND_OF_USUAL: f64 = 0.8;
-/// Three standard deviations along weak directions beyond which a pose is lost, metres.
+/// Three standard deviations along weak directions above which a pose is lost, metres.
 pub(super) const MAX_WEAK_M: f64 = 1.0;
-/// Part of the displacements that a motion makes which planes show, below which the motion is tried for its contrast. In a
-/// tunnel without features noise alone gives up to 0.3 in the map of one scan.
+/// Observed fraction of a motion below which its contrast is tested. In a tunnel without features, noise alone gives
+/// up to 0.3 in the map of one scan.
 const TRIED_PART: f64 = 0.3;
-/// The weakest directions are always tried.
+/// Number of weakest directions that are always tested.
 const ALWAYS_TRIED: usize = 2;
-/// Contrast below which a direction is weak, in standard deviations: 99 % of the scans of simulated corridors have more
-/// than 24, in tunnels without features the 95th percentile in a map of many scans is 16.
+/// Contrast below which a direction is weak, in standard deviations: 99 % of the scans of simulated corridors exceed
+/// 24; in tunnels without features, the 95th percentile in a map of many scans is 16.
 const LEAST_CONTRAST: f64 = 20.0;
 
 /// Verdict on the pose of a scan.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
-    /// The map holds the pose in all directions.
+    /// The map constrains the pose in all directions.
     Ok,
-    /// The map does not hold the pose along these directions, where it is predicted. The map does not grow.
+    /// The map does not constrain the pose along these directions; there it is predicted. The map is not extended.
     Weak(Vec<WeakDirection>),
-    /// The pose is a prediction.
+    /// The registration failed; the pose is predicted.
     Lost(LostCause),
 }
 
-/// A direction of motion that the surfaces in view do not show, in the axes of the map about the base.
+/// Degenerate direction: a motion that the visible surfaces do not constrain, in the axes of the map about the base.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WeakDirection {
-    /// Translation (m) and rotation (rad) of a motion along it.
+    /// Translation (m) and rotation (rad) of the motion.
     pub motion: Vector6<f64>,
-    /// Part of the displacement of points that planes show.
+    /// Observed fraction of the motion: squared displacement of the points normal to their planes, divided by all of
+    /// it.
     pub part: f64,
 }
 
 impl WeakDirection {
-    /// True if a direction is to be tried for its contrast, by its place among all, weakest first.
+    /// True if a direction is tested for its contrast, by its rank among all, weakest first.
     pub(super) fn is_tried(&self, place: usize) -> bool {
         place < ALWAYS_TRIED || self.part < TRIED_PART
     }
 }
 
-/// Reason for which a pose is lost.
+/// Reason why a pose is lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LostCause {
     /// The scan has too few points.
     FewPoints,
     /// The map does not explain the scan.
     NoOverlap,
-    /// Motion along a weak direction is not known to `MAX_WEAK_M`.
+    /// The motion along a weak direction is uncertain by more than `MAX_WEAK_M`.
     Unobservable,
-    /// The map was seen from one place only: points of the same beams agree there whatever the motion is.
+    /// All scans of the map were taken at one position: points of the same beams agree there at any motion.
     OnePlace,
 }
 
@@ -77,18 +78,18 @@ impl fmt::Display for LostCause {
 pub(super) struct Evidence {
     pub points: usize,
     pub overlap: f64,
-    /// Mean overlap of scans that were `OK` in this map.
+    /// Mean inlier fraction of scans with verdict `OK` in this map.
     pub usual_overlap: f64,
-    /// True if the scan before was lost, or long ago.
+    /// True if the previous scan was lost, or too long ago.
     pub was_lost: bool,
-    /// True if the scan is where the whole map was seen from.
+    /// True if the pose is at the only position of the scans in the map.
     pub is_one_place: bool,
     pub weak: Vec<WeakDirection>,
     /// Three standard deviations along weak directions, metres.
     pub weak_m: f64,
 }
 
-/// The verdict.
+/// Determines the verdict.
 pub(super) fn judge(evidence: Evidence) -> Verdict {
     let of_usual = match evidence.was_lost {
         true => FOUND_OF_USUAL,
@@ -112,7 +113,7 @@ pub(super) fn judge(evidence: Evidence) -> Verdict {
     Verdict::Weak(evidence.weak)
 }
 
-/// Contrast below which a direction is weak: larger before a lost scan is believed again.
+/// Contrast below which a direction is weak; higher for a scan after a lost one.
 pub(super) fn least_contrast(was_lost: bool) -> f64 {
     match was_lost {
         true => 1.5 * LEAST_CONTRAST,

@@ -96,7 +96,7 @@ struct Directions {
     steps: f64,
     /// Cosine and sine of the angles to the x axis.
     angles: [f64; 2],
-    /// Of the doubled angles: driving back counts as driving forward.
+    /// Sum over the doubled angles: driving back counts as driving forward.
     doubled: [f64; 2],
     /// Squared share of the motion along z.
     rise: f64,
@@ -129,7 +129,7 @@ impl Directions {
     }
 }
 
-/// Holds attitudes of a machine against the way it takes.
+/// Compares the attitudes of a machine with the direction of its path.
 #[derive(Clone, Debug, Default)]
 pub struct AttitudeCheck {
     last: Option<StampedPose>,
@@ -139,7 +139,7 @@ pub struct AttitudeCheck {
 }
 
 impl AttitudeCheck {
-    /// Takes the next pose of the machine, in order of time.
+    /// Adds the next pose of the machine, in order of time.
     pub fn on_pose(&mut self, pose: &StampedPose) {
         let Some(last) = self.last else {
             self.last = Some(*pose);

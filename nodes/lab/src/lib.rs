@@ -28,7 +28,7 @@ pub use report::{Report, markdown, write_report};
 /// Any error on its way to the user.
 pub type AnyError = Box<dyn Error + Send + Sync>;
 
-/// A pool of so many threads, at least one.
+/// Thread pool of `threads` threads, at least one.
 pub fn pool(threads: usize) -> Result<rayon::ThreadPool, AnyError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1));
     Ok(pool.build()?)

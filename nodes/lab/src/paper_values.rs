@@ -11,8 +11,7 @@ use lattice_core::lattice::{LatticeIndex, LatticeKind};
 use nalgebra::{Matrix3, Vector3};
 pub use search27::Search27;
 
-/// The generator matrix of eq. (8)-(12), with the four digits that are printed; `None` for a lattice
-/// that is not in the paper.
+/// Generator matrix of eq. (8)-(12) with its four printed digits; `None` for a lattice outside the paper.
 pub fn printed_generator(kind: LatticeKind) -> Option<Matrix3<f64>> {
     let rows = match kind {
         LatticeKind::Cubic => [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
@@ -27,8 +26,7 @@ pub fn printed_generator(kind: LatticeKind) -> Option<Matrix3<f64>> {
     Some(Matrix3::from_row_slice(&rows))
 }
 
-/// The columns of the matrix of eq. (3)-(7) in printed order, those with + first; empty for a
-/// lattice that is not in the paper.
+/// Columns of the matrix of eq. (3)-(7) in printed order, those with + first; empty for a lattice outside the paper.
 ///
 /// Eq. (3) is elided in print; it is taken for all 27 columns, with 0, in the order that it starts in.
 pub fn printed_delta(kind: LatticeKind) -> Vec<LatticeIndex> {
@@ -63,12 +61,12 @@ pub fn printed_delta(kind: LatticeKind) -> Vec<LatticeIndex> {
         .collect()
 }
 
-/// All differences with entries -1, 0 and 1, the last one fastest.
+/// All 27 index differences with entries -1, 0 and 1; the last entry varies fastest.
 pub fn off_by_one() -> [LatticeIndex; 27] {
     std::array::from_fn(|i| [i / 9, i / 3 % 3, i % 3].map(|entry| entry as i32 - 1))
 }
 
-/// Eq. (1) and (2) for a basis and a set of differences, in double precision.
+/// Quantizer by eq. (1) and (2) for a basis and a set of differences, in double precision.
 #[derive(Clone, Debug)]
 pub struct PaperQuantizer {
     generator: Matrix3<f64>,
@@ -77,8 +75,8 @@ pub struct PaperQuantizer {
 }
 
 impl PaperQuantizer {
-    /// For the basis in the columns of `generator_m` (metres) and the columns of Delta, which holds
-    /// no 0 unless it is given; `None` if the basis has no inverse.
+    /// Creates a quantizer from a basis, the columns of `generator_m` (metres), and the columns of Delta, in which 0
+    /// has to be listed. `None` if the basis has no inverse.
     pub fn new(generator_m: Matrix3<f64>, delta: &[LatticeIndex]) -> Option<PaperQuantizer> {
         let differences = delta
             .iter()
@@ -90,14 +88,14 @@ impl PaperQuantizer {
         })
     }
 
-    /// Eq. (1): every coordinate of `G^-1 p` rounded, for |w| < 2^31.
+    /// Rounds every coordinate of `G^-1 p`, for |w| < 2^31 (eq. (1)).
     pub fn rounded(&self, p: &Vector3<f64>) -> LatticeIndex {
         let w = self.inverse * p;
         [w.x, w.y, w.z].map(|x| x.round() as i32)
     }
 
-    /// Eq. (2): of the rounded index plus each difference the one nearest to `p`, the first of
-    /// equals; the rounded index if there are no differences.
+    /// Nearest lattice point to `p` among the rounded index plus each difference, the first of equals (eq. (2)); the
+    /// rounded index if there are no differences.
     pub fn nearest(&self, p: &Vector3<f64>) -> LatticeIndex {
         let w = self.rounded(p);
         let rest = p - self.generator * Vector3::from(w.map(f64::from));

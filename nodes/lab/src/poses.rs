@@ -1,4 +1,4 @@
-//! Poses in files.
+//! Readers of pose files.
 
 use std::fs::{File, read_to_string};
 use std::io::Read;
@@ -9,17 +9,17 @@ use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuat
 
 use crate::{AnyError, at};
 
-/// Most bytes of a file of 16 numbers.
+/// Size limit of a file with one pose, bytes.
 const MAX_BYTES: u64 = 1 << 16;
-/// Longest time over which poses of a trajectory are interpolated, s.
+/// Longest gap between poses of a trajectory that is interpolated, s.
 const MAX_GAP_S: f64 = 0.25;
-/// Deviation from 1 of the norm of a quaternion that a file may have: those with three digits pass.
+/// Allowed deviation of a quaternion norm from 1, so that quaternions with three digits pass.
 const MAX_OFF_NORM: f64 = 1e-2;
 
-/// A transform from a file of 16 numbers, row by row.
+/// Reads a transform from a file of 16 numbers, row by row, metres.
 ///
 /// # Errors
-/// Names the file that cannot be read or is no rigid transform.
+/// Unreadable file, or not a rigid transform; the text names the file.
 pub fn read_pose(path: &Path) -> Result<Isometry3<f64>, AnyError> {
     let wrong = |why: &str| format!("{}: {why}", path.display());
     let mut text = String::new();
@@ -44,10 +44,11 @@ fn parse_pose(text: &str) -> Option<Isometry3<f64>> {
     })
 }
 
-/// A trajectory from a TUM file: `stamp x y z qx qy qz qw` in each line, s and m; lines of `#` are comments.
+/// Reads a trajectory (`map_from_base`) from a TUM file: `stamp x y z qx qy qz qw` per line, in s and m; lines that
+/// begin with `#` are comments. Gaps above 0.25 s are not interpolated.
 ///
 /// # Errors
-/// Names the file and the line that is no pose, or not later than the one before.
+/// Unreadable file, invalid line, stamp not later than the one before, or no poses; the text names file and line.
 pub fn read_tum(path: &Path) -> Result<PoseBuffer, AnyError> {
     parse_tum(&read_to_string(path).map_err(at(path))?).map_err(at(path))
 }
@@ -96,7 +97,7 @@ fn tum_pose(line: &str) -> Option<StampedPose> {
     })
 }
 
-/// Seconds as ns: exact if they are decimal, as the digits of f64 do not last for ns since the epoch.
+/// Converts decimal seconds to ns without rounding: f64 has too few digits for ns since 1970.
 fn stamp_ns(text: &str) -> Option<i64> {
     let is_decimal = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
     let (whole, part) = text.split_once('.').unwrap_or((text, ""));

@@ -20,7 +20,7 @@ const MAX_NAME_BYTES: usize = 512;
 /// A publisher, subscription or server in the graph of nodes.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct GraphEndpoint {
-    /// Its role.
+    /// Role of the endpoint.
     pub role: GraphRole,
     /// Full name of the topic or service.
     pub name: String,
@@ -92,8 +92,8 @@ impl DiscoveredGraph {
         known.nodes.retain(|id, _| !gone(id));
     }
 
-    /// Takes a message of `ros_discovery_info`. GIDs have 24 bytes up to Humble and 16 bytes since; the two
-    /// lengths cannot be confused. A participant's claims apply to its own endpoints only.
+    /// Handles a message of `ros_discovery_info`. GIDs have 24 bytes up to Humble and 16 bytes since; the two lengths
+    /// cannot be confused. A participant's claims apply to its own endpoints only.
     pub(crate) fn on_message(&self, message: &[u8]) -> Result<(), CdrError> {
         match cdr::from_slice::<ParticipantEntitiesInfo<[u8; 16]>>(message) {
             Ok(message) => self.keep(message),

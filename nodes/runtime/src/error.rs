@@ -75,7 +75,7 @@ pub enum RuntimeError {
     /// A thread panicked.
     #[error("thread {thread} panicked; this is a bug, please report the message above")]
     Panicked {
-        /// Its name.
+        /// Name of the thread.
         thread: &'static str,
     },
     /// The runtime has shut down.
@@ -91,7 +91,9 @@ pub enum RuntimeError {
 #[non_exhaustive]
 pub enum PublishError {
     /// The queue is full.
-    #[error("{topic}: the queue of the publisher is full, message dropped ({dropped} so far)")]
+    #[error(
+        "{topic}: the queue of the publisher is full, message dropped ({dropped} so far): publish fewer or smaller messages"
+    )]
     QueueFull {
         /// Resolved topic.
         topic: String,
@@ -113,7 +115,7 @@ pub enum PublishError {
         topic: String,
         /// Length of the message.
         bytes: usize,
-        /// Its first bytes, up to four.
+        /// First bytes of the message, up to four.
         header: Vec<u8>,
     },
 }

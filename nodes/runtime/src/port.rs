@@ -58,9 +58,9 @@ pub(crate) enum EndpointKind {
 /// Identity of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct SampleId {
-    /// Its writer, or the endpoint that the sender names instead.
+    /// Writer of the sample, or the endpoint that the sender names instead.
     pub writer: EndpointId,
-    /// Its sequence number; 0 if the sender gives none.
+    /// Sequence number; 0 if the sender gives none.
     pub number: i64,
 }
 
@@ -173,7 +173,7 @@ pub(crate) enum PortEvent {
     Found {
         peer: EndpointId,
         publisher: Box<RemotePublisher>,
-        /// Its node, if announced.
+        /// Node of the endpoint, if announced.
         node: Option<String>,
     },
     /// A subscription or server was discovered.
@@ -183,7 +183,7 @@ pub(crate) enum PortEvent {
         name: String,
         /// Type and QoS of a subscription.
         announced: Option<Box<Announced>>,
-        /// Its node, if announced.
+        /// Node of the endpoint, if announced.
         node: Option<String>,
     },
     /// A peer has left.
@@ -264,7 +264,7 @@ pub(crate) enum WriteRefusal {
 
 /// Sending end of a topic.
 pub(crate) trait SampleWriter: Send + Sync {
-    /// Its identity.
+    /// Identity of the endpoint.
     fn id(&self) -> EndpointId;
 
     /// Writes the body of a little-endian CDR sample, with the identity of its request, if any.
@@ -296,7 +296,7 @@ pub(crate) struct ReaderLosses {
 
 /// Receiving end of a topic.
 pub(crate) trait SampleReader: Send + Sync {
-    /// Its identity.
+    /// Identity of the endpoint.
     fn id(&self) -> EndpointId;
 
     /// Polls for the next sample; see [`SampleReader::next`].

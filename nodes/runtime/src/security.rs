@@ -44,7 +44,7 @@ pub struct Security {
 pub(crate) struct Enclave {
     /// Announced name.
     pub name: String,
-    /// Its files; `None` without security.
+    /// Files of the enclave; `None` without security.
     pub secrets: Option<Secrets>,
 }
 

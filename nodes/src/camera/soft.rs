@@ -14,7 +14,7 @@ const MAX_ELEMENTS: usize = 256;
 pub struct Share {
     /// The class.
     pub class: u16,
-    /// Its probability; 65535 is one.
+    /// Probability of the label; 65535 is one.
     parts: u16,
 }
 

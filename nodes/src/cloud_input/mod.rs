@@ -64,7 +64,7 @@ pub enum CloudInputError {
     ChannelLength {
         /// Name of the channel.
         channel: String,
-        /// Its values.
+        /// Number of values of the channel.
         values: usize,
         /// Points of the message.
         points: usize,
@@ -145,15 +145,15 @@ impl CloudType {
 /// A decoded message with points or ranges.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SensorCloud {
-    /// As it is.
+    /// Cloud of points.
     PointCloud2(PointCloud2),
-    /// Of a Livox driver.
+    /// Cloud of a Livox driver.
     Livox(livox_ros_driver2::CustomMsg),
-    /// Of the type before PointCloud2.
+    /// Cloud of the type before PointCloud2.
     PointCloud(PointCloud),
-    /// Of a planar laser.
+    /// Scan of a planar laser scanner.
     LaserScan(LaserScan),
-    /// Of a planar laser with several echoes a ray.
+    /// Scan of a planar laser scanner with several echoes per ray.
     MultiEchoLaserScan(MultiEchoLaserScan),
 }
 

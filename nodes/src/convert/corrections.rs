@@ -18,7 +18,7 @@ const MAX_ANCHORS: usize = 100_000;
 /// Corrections, and the submaps whose place in the map is known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlacedCorrections {
-    /// Of all submaps.
+    /// Corrections of all submaps.
     pub corrections: Corrections,
     /// Numbers of the submaps whose place is known.
     pub placed: BTreeSet<u32>,

@@ -70,7 +70,7 @@ pub(super) struct Attitudes {
 }
 
 impl Attitudes {
-    /// Takes the next pose; warns once of a contradiction.
+    /// Checks the next pose; warns once of a contradiction.
     pub fn on_pose(&mut self, pose: &StampedPose, options: &TransformerOptions) {
         self.check.on_pose(pose);
         if self.is_told {

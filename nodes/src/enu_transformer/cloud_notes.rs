@@ -1,12 +1,11 @@
-//! Notes on clouds that are read otherwise than declared, and on the source of the times of their points, once
-//! for each topic.
+//! Notes on corrected layouts of clouds and on the source of the times of their points, once for each topic.
 
 use lattice_core::cloud::{LayoutNote, TimeSource, TimeUnit};
 use serde::{Deserialize, Serialize};
 
-/// Most notes that are kept.
+/// Limit of notes.
 const MAX_NOTES: usize = 128;
-/// Clouds of a topic whose times are held against the time between them.
+/// Number of clouds of a topic whose point times are compared with the period of the clouds.
 const CHECKED_CLOUDS: u32 = 3;
 
 /// Note on the clouds of a topic.
@@ -14,9 +13,9 @@ const CHECKED_CLOUDS: u32 = 3;
 pub struct CloudNote {
     /// Topic of the clouds.
     pub topic: String,
-    /// True if points may be in a wrong place by it.
+    /// True if points may have wrong positions because of it.
     pub is_warning: bool,
-    /// The note, with a remedy.
+    /// Text of the note, with a remedy.
     pub text: String,
 }
 
@@ -37,20 +36,20 @@ struct TopicTimes {
 }
 
 impl CloudNotes {
-    /// All notes, in the order of their first cloud.
+    /// Notes in the order of their first cloud.
     pub fn all(&self) -> &[CloudNote] {
         &self.notes
     }
 
-    /// Notes what of the layout of a cloud was changed.
+    /// Notes corrections of the layout of a cloud.
     pub fn on_layout(&mut self, topic: &str, notes: &[LayoutNote]) {
         for note in notes {
             self.add(topic, true, note.to_string());
         }
     }
 
-    /// Notes what was taken for time in the first cloud of a topic that has points, and times that would
-    /// fit the time between clouds in another unit.
+    /// Notes the time field of the first cloud of a topic with points, and times that would fit the period of the
+    /// clouds in another unit.
     pub fn on_times(&mut self, topic: &str, stamp_ns: i64, source: &TimeSource) {
         if *source == TimeSource::Nothing {
             return;
@@ -117,7 +116,7 @@ impl CloudNotes {
     }
 }
 
-/// A text without its numbers: those of the next cloud make no other note.
+/// Text without its numbers, so that those of the next cloud give no new note.
 fn kind(text: &str) -> impl Iterator<Item = char> {
     text.chars().filter(|c| !c.is_ascii_digit())
 }
@@ -126,7 +125,7 @@ fn shown(name: &str) -> String {
     name.chars().take(48).collect()
 }
 
-/// True for a warning, and the text.
+/// Text of a note, and true if it is a warning.
 fn text(source: &TimeSource) -> (bool, String) {
     match source {
         TimeSource::Nothing => (false, String::new()),
@@ -163,8 +162,8 @@ fn text(source: &TimeSource) -> (bool, String) {
     }
 }
 
-/// The unit other than `unit` in which times that span next to nothing span most of the time between
-/// clouds.
+/// Another unit in which the times would span most of the period of the clouds, if they span almost nothing in
+/// `unit`.
 fn other_unit(span_ns: i64, unit: TimeUnit, period_ns: i64) -> Option<TimeUnit> {
     let (span, period) = (span_ns as f64, period_ns as f64);
     if span <= 0.0 || span > 0.02 * period {

@@ -106,7 +106,7 @@ pub struct InsOptions {
     pub source: InsSource,
     /// Stamp of NovAtel messages.
     pub stamp: InsStamp,
-    /// GPS minus UTC.
+    /// GPS time minus UTC, s.
     pub leap_seconds: i32,
     /// Height reference of INSPVAX.
     pub inspvax_height: HeightDatum,
@@ -129,14 +129,14 @@ pub struct InsOptions {
     pub max_fix_gap_s: f64,
     /// Largest accepted speed, m/s.
     pub max_speed_m_per_s: f64,
-    /// Time for which positions must agree on an unreachable place before it is accepted, ns.
+    /// Time for which positions must agree on an unreachable position before it is accepted, ns.
     pub settle_ns: i64,
     /// Forward step of stamps beyond which three must agree, ns.
     pub ahead_ns: i64,
 }
 
 impl InsOptions {
-    /// An attitude of the messages as `enu_from_flu`; those of the usual convention keep their bits.
+    /// Attitude of a message as `enu_from_flu`; attitudes in this convention are unchanged to the bit.
     fn enu(&self, attitude: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
         let attitude = match self.orientation {
             AttitudeConvention::Enu => attitude,
@@ -148,7 +148,7 @@ impl InsOptions {
         }
     }
 
-    /// Parameter that is set and that the source of poses ignores.
+    /// Parameter that is set but ignored by the source of poses.
     pub fn ignored(&self) -> Option<&'static str> {
         let is_tf = self.source == InsSource::Tf;
         let has_azimuth = matches!(self.source, InsSource::Inspva | InsSource::Inspvax);

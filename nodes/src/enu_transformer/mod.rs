@@ -60,30 +60,29 @@ use self::waiting::{Waiting, WaitingCloud};
 use crate::cloud_input::CloudInputError;
 use crate::convert::cloud;
 
-/// A step back of the receiving clock by more than this is a log that loops.
+/// Backward step of the receiving clock above which a log is taken to repeat, ns.
 const CLOCK_JUMP_NS: i64 = 1_000_000_000;
-/// Part of the wait of a cloud after which another place of the machine is believed, so that clouds there
-/// are still waiting.
+/// Fraction of the waiting time of a cloud after which a new position of the machine is accepted, so that clouds
+/// there are still waiting.
 const SETTLE_PART: f64 = 0.5;
 
 /// Output of the transformer.
 #[derive(Clone, Debug)]
 pub enum EnuOutput {
-    /// For `points_enu`.
+    /// Cloud for `points_enu`.
     Points(Arc<PointCloud2>),
-    /// For `/tf`.
+    /// Transform for `/tf`.
     Transform(TransformStamped),
-    /// For `/tf_static`: `earth` -> `map`.
+    /// Transform for `/tf_static`: `earth` -> `map`.
     StaticTransform(TransformStamped),
-    /// For `map_origin`.
+    /// Origin for `map_origin`.
     Origin(GeoPointStamped),
 }
 
-/// Moves clouds of any number of sensors into the map frame, each point at its own time.
+/// Transforms clouds of any number of sensors into the map frame, each point at its own time.
 ///
-/// Clouds wait in a bounded queue until poses and mounts cover all of their points; nothing is
-/// extrapolated. Every input comes with the time at which it was received (`now_ns`): the clock
-/// of the node, or the log's own time.
+/// Clouds wait in a bounded queue until poses and mounts cover all of their points; nothing is extrapolated. Every
+/// input has the time of its reception (`now_ns`): of the clock of the node, or of the log.
 pub struct EnuTransformer {
     options: TransformerOptions,
     ins: InsDecoder,
@@ -92,7 +91,7 @@ pub struct EnuTransformer {
     /// Order and speed of the poses of the machine in the map.
     order: StampOrder<StampedPose>,
     speed: SpeedGate<StampedPose>,
-    /// Delay of late poses that is known beforehand.
+    /// Expected delay of late poses, ns.
     expected_delay_ns: i64,
     /// Topic of the last pose.
     pose_topic: Arc<str>,
@@ -103,7 +102,7 @@ pub struct EnuTransformer {
     notes: CloudNotes,
     waiting_poses: VecDeque<WaitingPose>,
     reference: Reference,
-    /// Frame that poses are in, where it is not the map frame.
+    /// Frame of the poses, if it is not the map frame.
     pose_frame: Option<Arc<str>>,
     has_warned_reference: bool,
     announced: bool,
@@ -115,7 +114,7 @@ pub struct EnuTransformer {
 }
 
 impl EnuTransformer {
-    /// A transformer without poses.
+    /// Creates a transformer without poses.
     pub fn new(options: TransformerOptions) -> Self {
         let poses = PoseBuffer::new(PoseBufferOptions {
             span_s: options.pose_span_s,
@@ -161,7 +160,7 @@ impl EnuTransformer {
         }
     }
 
-    /// The options.
+    /// Options.
     #[cfg(feature = "bags")]
     pub(crate) fn options(&self) -> &TransformerOptions {
         &self.options
@@ -174,7 +173,7 @@ impl EnuTransformer {
         self.options = options;
     }
 
-    /// Takes a message of the INS on a topic.
+    /// Handles a message of the INS on a topic.
     pub fn on_ins(&mut self, topic: &str, message: InsMessage, now_ns: i64) -> Vec<EnuOutput> {
         let mut out = Vec::new();
         self.advance(now_ns);
@@ -194,7 +193,7 @@ impl EnuTransformer {
         out
     }
 
-    /// Takes a cloud of a sensor on a topic; it comes out at once or when its poses have come.
+    /// Handles a cloud of a sensor on a topic; it is returned at once, or later when its poses have arrived.
     pub fn on_cloud(
         &mut self,
         topic: &str,
@@ -236,7 +235,7 @@ impl EnuTransformer {
             .add(topic, "undecodable", || format!("does not decode: {error}"));
     }
 
-    /// Lets clouds that have waited too long go. To be called now and then.
+    /// Drops clouds that have waited too long. To be called periodically.
     pub fn tick(&mut self, now_ns: i64) -> Vec<EnuOutput> {
         let mut out = Vec::new();
         self.advance(now_ns);
@@ -244,7 +243,7 @@ impl EnuTransformer {
         out
     }
 
-    /// Ends the input: clouds that are covered come out, the others are counted as having come too early.
+    /// Ends the input: returns the clouds that poses cover, and counts the others by the reason of their drop.
     pub fn finish(&mut self) -> Vec<EnuOutput> {
         let mut out = Vec::new();
         self.refuse_waiting_poses();
@@ -264,17 +263,17 @@ impl EnuTransformer {
         out
     }
 
-    /// Notes on clouds read otherwise than declared, and on the source of the times of their points.
+    /// Notes on corrected layouts of clouds, and on the source of the times of their points.
     pub fn notes(&self) -> &[CloudNote] {
         self.notes.all()
     }
 
-    /// Expects poses to come late by as much, in nanoseconds, before the first one does.
+    /// Sets the expected delay of poses, ns, which applies until a pose has been late.
     pub fn expect_delay(&mut self, delay_ns: i64) {
         self.expected_delay_ns = delay_ns;
     }
 
-    /// Messages refused, by topic and reason.
+    /// Rejected messages by topic and reason.
     pub fn refusals(&self) -> &Refusals {
         &self.refusals
     }
@@ -284,7 +283,7 @@ impl EnuTransformer {
         &self.counts
     }
 
-    /// Clouds that wait for their poses.
+    /// Number of clouds that wait for their poses.
     pub fn waiting(&self) -> usize {
         self.waiting.len()
     }
@@ -299,7 +298,7 @@ impl EnuTransformer {
         })
     }
 
-    /// Notices a receiving clock that jumped back.
+    /// Handles a backward step of the receiving clock.
     fn advance(&mut self, now_ns: i64) {
         let last_ns = self.last_now_ns.replace(now_ns).unwrap_or(now_ns);
         if now_ns < last_ns.saturating_sub(CLOCK_JUMP_NS) {
@@ -310,7 +309,7 @@ impl EnuTransformer {
         }
     }
 
-    /// Transforms what can be transformed by now, in the order of arrival.
+    /// Transforms all clouds that can be transformed now, in the order of arrival.
     fn serve(&mut self, now_ns: i64, out: &mut Vec<EnuOutput>) {
         self.settle_poses(now_ns, out);
         let mut i = 0;
@@ -331,7 +330,7 @@ impl EnuTransformer {
         }
     }
 
-    /// Transforms a cloud that is covered.
+    /// Transforms a cloud that poses and mounts cover.
     fn place(&mut self, cloud: &WaitingCloud, out: &mut Vec<EnuOutput>) {
         match self.transform(cloud) {
             Ok(points) => {

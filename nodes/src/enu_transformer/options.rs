@@ -53,20 +53,19 @@ pub struct TransformerOptions {
     pub precision: Option<Precision>,
     /// Fields of the clouds that `points_enu` keeps, where they have them.
     pub pass_fields: Vec<String>,
-    /// True if `points_enu` has for each point the place of the sensor, which a mapper of free space
-    /// needs.
+    /// True if each point of `points_enu` has the position of the sensor, for mapping of free space.
     pub viewpoints: bool,
-    /// `map_from_map`: a correction of all poses, where one is known.
+    /// `map_from_map`: correction applied to all poses; `None` if unknown.
     pub correction: Option<Isometry3<f64>>,
 }
 
-/// Faster than vehicles in traffic.
+/// Default speed limit of the machine, above that of road vehicles.
 const MAX_SPEED_M_PER_S: f64 = 50.0;
 
-/// More than any cloud has that a map needs.
+/// Limit of fields passed through.
 const MAX_PASS_FIELDS: usize = 64;
 
-/// Labels, and what they are worth.
+/// Default fields passed through: labels and their probabilities.
 const LABEL_FIELDS: [&str; 3] = ["label", "confidence", "label_probs"];
 
 impl TransformerOptions {

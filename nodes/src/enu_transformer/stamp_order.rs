@@ -57,11 +57,10 @@ impl Refused {
 
 /// Stamp order of a stream.
 ///
-/// An item older than the newest is late if it fills a hole of the stream; it is inserted in order.
-/// An item between consecutive stamps without a hole, more than a second older, or
-/// ahead by more than the limit, is held. Three held items without an item of the stream's
-/// time between them are a clock step, and all items since the newest are returned; otherwise they are rejected.
-/// are refused.
+/// An item older than the newest is late if it lies in a gap of the stream; it is inserted in order. An item is held if
+/// it lies between consecutive stamps without a gap, is more than a second older, or ahead by more than the limit.
+/// Three held items without an item of the stream's time between them are a clock step, and all items since the newest
+/// are returned. Otherwise held items are rejected.
 #[derive(Clone, Debug)]
 pub(crate) struct StampOrder<T> {
     ahead_ns: i64,

@@ -12,21 +12,21 @@ use super::cloud_notes::CloudNotes;
 use super::cloud_times::CloudTimes;
 use crate::convert::cloud;
 
-/// A cloud whose layout has been checked, with the time of each point.
+/// Cloud with a validated layout and the time of each point.
 pub struct WaitingCloud {
     pub topic: Arc<str>,
     pub message: Arc<PointCloud2>,
     /// Frame without a leading slash.
     pub frame: String,
     pub stamp_ns: i64,
-    /// Time of each point; `None`: all at the stamp.
+    /// Time of each point; `None` if all are measured at the stamp.
     pub times: Option<Vec<i64>>,
-    /// Times of the earliest and latest point.
+    /// Times of the earliest and the latest point, ns.
     pub first_ns: i64,
     pub last_ns: i64,
-    /// Time at which it was received.
+    /// Time of reception, ns.
     pub arrived_ns: i64,
-    /// Clock of its topic when it came.
+    /// Clock state of its topic at the reception.
     pub clock: CloudClock,
 }
 
@@ -58,7 +58,7 @@ impl WaitingCloud {
     }
 }
 
-/// A queue bounded in clouds and bytes; the oldest goes when it is full.
+/// Queue with limits of clouds and bytes; the oldest clouds are dropped when it is full.
 pub struct Waiting {
     clouds: VecDeque<WaitingCloud>,
     bytes: usize,
@@ -76,12 +76,12 @@ impl Waiting {
         }
     }
 
-    /// Bounds the clouds from the next one on.
+    /// Sets the limit of clouds, at least 1, which applies from the next cloud on.
     pub fn set_max_clouds(&mut self, max_clouds: usize) {
         self.max_clouds = max_clouds.max(1);
     }
 
-    /// Adds a cloud and gives the older ones that have to go for it.
+    /// Adds a cloud; returns the older ones dropped for it.
     pub fn push(&mut self, cloud: WaitingCloud) -> Vec<WaitingCloud> {
         self.bytes += cloud.bytes();
         self.clouds.push_back(cloud);

@@ -255,7 +255,7 @@ impl HeadsetCloud {
         &self.counts
     }
 
-    /// Queued images, and incomplete surfaces.
+    /// Number of queued images and of incomplete surfaces.
     pub fn waiting(&self) -> [usize; 2] {
         [self.waiting.len(), self.surfaces.waiting()]
     }

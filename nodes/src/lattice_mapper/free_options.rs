@@ -26,7 +26,7 @@ pub enum FreeSpaceMethod {
 pub struct MappedFreeSpace {
     /// Method.
     pub method: FreeSpaceMethod,
-    /// Duration of the clouds of one scan, ns; 0: each cloud is a scan.
+    /// Duration of a sweep, whose clouds count as one scan, ns; 0: each cloud is a scan.
     pub sweep_ns: i64,
     /// Range, kept ends, misses and memory; evidence uses all but the misses.
     pub clear: ClearOptions,

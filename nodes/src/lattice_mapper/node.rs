@@ -152,7 +152,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
                 "~/reset",
                 move || match services.send(Event::Reset, 0) {
                     true => (true, "map emptied".into()),
-                    false => (false, "busy, ask again".into()),
+                    false => (false, "the inbox of the node is full: call again".into()),
                 },
             )?)
         }

@@ -84,7 +84,7 @@ impl LatticeMapper {
         Ok(voxels)
     }
 
-    /// Takes the map of another mapper of the same lattice and begins a new epoch, as [`LatticeMapper::reset`] does.
+    /// Adopts the map of another mapper of the same lattice and begins a new epoch, as [`LatticeMapper::reset`] does.
     pub(super) fn take_map(&mut self, other: LatticeMapper, epoch: u64) {
         (self.list, self.occupancy) = (other.list, other.occupancy);
         self.begin(epoch);

@@ -10,7 +10,7 @@ pub enum CloudRefusal {
         "cloud in frame '{found}', expected '{expected}': is enu_transformer between the sensor and the mapper?"
     )]
     Frame {
-        /// As sent.
+        /// Frame of the message.
         found: String,
         /// The mapper's `map_frame`.
         expected: String,
@@ -34,7 +34,7 @@ pub enum CloudRefusal {
         *step_ns as f64 * 1e-9
     )]
     Stamp {
-        /// As sent.
+        /// Stamp of the message.
         stamp_ns: i64,
         /// Difference to the stamp of the previous cloud.
         step_ns: i64,

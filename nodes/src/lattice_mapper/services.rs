@@ -23,7 +23,7 @@ use crate::compute::Inbox;
 use crate::start::NodeError;
 use lattice_runtime::{Node, Reply, Server};
 
-pub(super) const BUSY: &str = "busy, ask again";
+pub(super) const BUSY: &str = "the inbox of the node is full: call again";
 
 /// Request handled by the compute thread.
 pub(super) enum Call {

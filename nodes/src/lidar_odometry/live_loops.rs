@@ -1,4 +1,4 @@
-//! Loops of a running odometry, sought on a thread of their own: a registration takes seconds.
+//! Loop closure of a running odometry, on a thread of its own because a registration takes seconds.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
@@ -13,30 +13,30 @@ use nalgebra::{Isometry3, Vector3};
 use super::Registered;
 use crate::convert::corrections::PlacedCorrections;
 
-/// Segments that wait for the thread: at half a range of path each, hundreds of metres.
+/// Capacity of the queue of segments: hundreds of metres of path.
 const QUEUE: usize = 64;
 
-/// A segment with the number of its drive.
+/// Segment with the number of its drive.
 type Work = (u32, Segment);
 
 /// Loops and corrections of the drive so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LoopState {
     drive: u32,
-    /// Number that grows with each change.
+    /// Version, incremented by each change.
     pub version: u64,
     pub corrections: PlacedCorrections,
-    /// Places of both ends of each loop that closed, metres in the map.
+    /// Positions of both ends of each closed loop, metres, map frame.
     pub lines_m: Vec<[Vector3<f64>; 2]>,
     pub refused: u64,
-    /// Submaps that have begun: number, end of the last scan before, time of the first point, ns.
+    /// Begun submaps: number, end of the last scan before, time of the first point, ns.
     begun: Vec<(u32, i64, i64)>,
     /// End of the newest scan with a certain pose, ns.
     end_ns: i64,
 }
 
 impl LoopState {
-    /// Takes a scan with a certain pose: begins its submap, unless it has begun.
+    /// Begins the submap of a scan with verdict `OK`, unless it has begun.
     fn on_scan(&mut self, submap: u32, begin_ns: i64, end_ns: i64) {
         let before_ns = std::mem::replace(&mut self.end_ns, end_ns);
         let anchors = self.corrections.corrections.anchors();
@@ -57,12 +57,12 @@ impl LoopState {
 pub(super) struct LiveLoops {
     state: Arc<Mutex<LoopState>>,
     work: Sender<Work>,
-    /// Segments without a place in the queue.
+    /// Number of segments dropped because the queue was full.
     pub segments_queue_full: u64,
 }
 
 impl LiveLoops {
-    /// Starts the thread; `on_change` is called after each segment. The thread ends with the queue.
+    /// Starts the thread; `on_change` is called after each segment. The thread ends when this is dropped.
     pub fn start(on_change: impl Fn() + Send + Sync + 'static) -> io::Result<Self> {
         let (work, queue) = bounded(QUEUE);
         let state: Arc<Mutex<LoopState>> = Arc::default();
@@ -84,7 +84,7 @@ impl LiveLoops {
         })
     }
 
-    /// Takes a scan of the drive.
+    /// Handles a registered scan: queues its segment, if any, for loop closure, and begins its submap.
     pub fn on_scan(&mut self, found: &Registered) {
         let (drive, result) = (found.drive, &found.result);
         if let Some(segment) = &found.segment {
@@ -104,31 +104,32 @@ impl LiveLoops {
         }
     }
 
-    /// State of now, if its number is not `version`.
+    /// Current state, if its version differs from `version`.
     pub fn newer_than(&self, version: u64) -> Option<LoopState> {
         let state = lock(&self.state);
         (state.version != version).then(|| state.clone())
     }
 
-    /// Pose of the frame of the odometry in the map: of submaps without a known place that of the submap before.
+    /// Pose of the odometry frame in the map (`map_from_odom`). Submaps without a known pose have that of the submap
+    /// before.
     pub fn map_from_odom(&self, stamp_ns: i64) -> Isometry3<f64> {
         let anchor = lock(&self.state).corrections.corrections.at(stamp_ns);
         anchor.map_or_else(Isometry3::identity, |anchor| anchor.map_from_odom)
     }
 
-    /// True if the place of a submap in the map is known.
+    /// True if the pose of a submap in the map is known.
     pub fn is_placed(&self, submap: u32) -> bool {
         lock(&self.state).corrections.placed.contains(&submap)
     }
 
-    /// Numbers of loops that closed and that were refused.
+    /// Numbers of closed and of rejected loops.
     pub fn counts(&self) -> [u64; 2] {
         let state = lock(&self.state);
         [state.lines_m.len() as u64, state.refused]
     }
 }
 
-/// Seeks loops until the queue ends.
+/// Searches for loops until the queue ends.
 fn seek(queue: &Receiver<Work>, state: &Mutex<LoopState>, on_change: &dyn Fn()) {
     let (mut closer, mut drive) = (LoopCloser::default(), 0);
     for (of_drive, segment) in queue {
@@ -144,7 +145,7 @@ fn seek(queue: &Receiver<Work>, state: &Mutex<LoopState>, on_change: &dyn Fn()) 
     }
 }
 
-/// Brings the state up to the segments of a closer.
+/// Updates the state to the segments of a closer.
 fn renew(state: &mut LoopState, closer: &LoopCloser, drive: u32) {
     if state.drive != drive {
         return;

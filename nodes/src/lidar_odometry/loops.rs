@@ -12,7 +12,7 @@ pub struct DriveLoops {
 }
 
 impl DriveLoops {
-    /// Takes a scan. A log that begins again has no loops: its poses have two frames.
+    /// Handles a scan. A log that begins again has no loops: its poses have two frames.
     pub fn add(&mut self, found: &Registered) {
         self.drive = self.drive.max(found.drive);
         self.close(found.segment.clone());

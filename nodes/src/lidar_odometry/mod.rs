@@ -41,7 +41,7 @@ const CLOCK_JUMP_NS: i64 = 1_000_000_000;
 /// Pose of a scan, with the tag of its cloud.
 #[derive(Clone, Debug)]
 pub struct Registered {
-    /// As given with the cloud.
+    /// Tag given with the cloud.
     pub tag: i64,
     /// Pose and verdict.
     pub result: ScanResult,
@@ -113,7 +113,7 @@ impl LidarOdometry {
         }
     }
 
-    /// Takes transforms of the mounts.
+    /// Handles transforms of the mounts.
     pub fn on_tf(&mut self, message: &TFMessage, is_static: bool) {
         for transform in &message.transforms {
             let (parent, child) = (&transform.header.frame_id, &transform.child_frame_id);
@@ -132,7 +132,7 @@ impl LidarOdometry {
         }
     }
 
-    /// Takes a sample of a gyroscope, and gives the pose of a scan that waited for it.
+    /// Handles a sample of a gyroscope. Returns the pose of a scan that waited for it.
     pub fn on_imu(&mut self, topic: &str, imu: &Imu) -> Option<Registered> {
         let taken = (self.motions).on_imu(imu, &self.options.base_frame, &mut self.mounts);
         if let Err(text) = taken {
@@ -142,7 +142,7 @@ impl LidarOdometry {
         self.register_if_complete()
     }
 
-    /// Takes a pose of wheel odometry, and gives the pose of a scan that waited for it.
+    /// Handles a pose of wheel odometry. Returns the pose of a scan that waited for it.
     pub fn on_wheels(&mut self, topic: &str, wheels: &Odometry) -> Option<Registered> {
         let taken = (self.motions).on_wheels(wheels, &self.options.base_frame, &mut self.mounts);
         if let Err(text) = taken {
@@ -152,8 +152,8 @@ impl LidarOdometry {
         self.register_if_complete()
     }
 
-    /// Takes a cloud, and gives the poses of scans that need not wait for other sensors: those of clouds before and of this
-    /// one. Clouds without a pose are counted by reason. `tag` returns with the pose.
+    /// Handles a cloud. Returns the poses of earlier scans and of this one that need not wait for other sensors.
+    /// Clouds without a pose are counted by reason. `tag` is returned with the pose.
     pub fn on_cloud(&mut self, topic: &str, message: &PointCloud2, tag: i64) -> Vec<Registered> {
         self.counts.clouds_in += 1;
         let mut found: Vec<Registered> = self.finish().into_iter().collect();

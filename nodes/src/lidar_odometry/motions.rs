@@ -38,7 +38,7 @@ impl Motions {
         }
     }
 
-    /// Takes a sample of a gyroscope. `Err`: the reason for which it is not used.
+    /// Adds a sample of a gyroscope. `Err`: the reason why it is not used.
     pub fn on_imu(
         &mut self,
         imu: &Imu,
@@ -79,7 +79,7 @@ impl Motions {
         Ok(())
     }
 
-    /// Takes a pose of wheel odometry. `Err`: the reason for which it is not used.
+    /// Adds a pose of wheel odometry. `Err`: the reason why it is not used.
     pub fn on_wheels(
         &mut self,
         wheels: &Odometry,

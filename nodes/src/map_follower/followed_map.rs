@@ -17,7 +17,7 @@ pub struct FollowedMap {
     pub info: LatticeInfo,
     /// Lattice of the info.
     pub lattice: Lattice,
-    /// Its datum in the map frame, in metres.
+    /// Datum of the lattice in the map frame, metres.
     pub datum_m: Vector3<f64>,
     /// Frame of the map.
     pub frame_id: String,

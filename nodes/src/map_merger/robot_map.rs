@@ -89,7 +89,7 @@ impl RobotMap {
         own.next()
     }
 
-    /// Its map, if it is complete and its epoch was not admitted yet.
+    /// Map of the robot, if it is complete and its epoch was not admitted yet.
     pub(super) fn begun(&self) -> Option<&FollowedMap> {
         self.follower.sequence()?;
         let map = self.follower.map()?;

@@ -267,7 +267,7 @@ impl MapProjector {
         self.error.as_ref()
     }
 
-    /// Voxels of the current map.
+    /// Number of voxels of the followed map; 0 before its first keyframe.
     pub fn voxels(&self) -> usize {
         self.follower.map().map_or(0, |map| map.voxels().len())
     }
@@ -277,7 +277,7 @@ impl MapProjector {
         self.follower.differences()
     }
 
-    /// Frame of the map.
+    /// Frame of the map; `None` before its first keyframe.
     pub fn map_frame(&self) -> Option<&str> {
         self.follower.map().map(|map| map.frame_id.as_str())
     }

@@ -24,8 +24,8 @@ pub fn read_mesh(path: &Path, max_triangles: usize) -> Result<LabelledMesh, Mesh
     read_mesh_in(path, Axes::RosFlu, max_triangles)
 }
 
-/// Reads a mesh file for a caller with these axes: those of glTF are converted to them, see
-/// [`gltf::from_bytes`]; PLY and OBJ files are assumed to use them.
+/// Reads a mesh file into the given axes. glTF files are converted to them, see [`gltf::from_bytes`]; PLY and OBJ
+/// files are assumed to have them.
 pub fn read_mesh_in(
     path: &Path,
     axes: Axes,

@@ -29,7 +29,7 @@ pub struct MeshScene {
     bvh: CwBvh,
     /// Triangles in leaf order.
     triangles: Vec<Triangle>,
-    /// Their indices in the mesh.
+    /// Indices of the triangles in the mesh.
     numbers: Vec<u32>,
 }
 

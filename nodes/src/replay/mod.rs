@@ -102,7 +102,7 @@ impl Pipeline {
         }
     }
 
-    /// Takes static transforms before the first message.
+    /// Adds static transforms before the first message.
     fn hold(&mut self, transforms: &TFMessage, now_ns: i64) {
         let outputs = self.transformer.on_tf(transforms, true, now_ns);
         self.map(outputs);
@@ -137,7 +137,7 @@ impl Pipeline {
         }
     }
 
-    /// Takes poses of lidar odometry.
+    /// Handles poses of lidar odometry.
     fn on_scan_poses(&mut self, topic: &str, poses: &[Odometry], now_ns: i64) {
         for pose in poses {
             let outputs = (self.transformer).on_ins(topic, InsMessage::Odometry(pose), now_ns);
@@ -216,7 +216,7 @@ impl Pipeline {
 }
 
 impl Branch {
-    /// Gives the markers what changed, as the nodes do by topics.
+    /// Passes changes of the map to the markers, as the nodes do by topics.
     fn update(&mut self) {
         if self.markers.voxels() == 0 {
             for chunk in self.mapper.keyframe() {

@@ -90,7 +90,7 @@ impl TopicPlan {
     }
 }
 
-/// Gives every topic that is of use its role, and finds the frames that the user does not name.
+/// Assigns roles to the topics in use, and finds the frames that the user does not name.
 pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicError> {
     let mut clouds = survey::clouds(bag)?;
     if !wishes.points.is_empty() {

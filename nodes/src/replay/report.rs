@@ -15,7 +15,7 @@ use crate::voxel_marker_publisher::MarkerReport;
 pub struct LatticeReport {
     /// The map.
     pub map: MapperReport,
-    /// Its markers.
+    /// Report of the markers.
     pub markers: MarkerReport,
 }
 

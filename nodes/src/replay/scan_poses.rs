@@ -132,7 +132,7 @@ pub enum OdometryInput<'a> {
 }
 
 impl OdometryInput<'_> {
-    /// Gives the input to an odometry; the tags of poses are log times of clouds.
+    /// Passes the input to an odometry; the tags of poses are log times of clouds.
     pub fn give(&self, machine: &mut LidarOdometry) -> Vec<Registered> {
         match self {
             Self::Cloud(topic, cloud, log_time_ns) => machine.on_cloud(topic, cloud, *log_time_ns),
@@ -142,7 +142,7 @@ impl OdometryInput<'_> {
     }
 }
 
-/// Gives an odometry the transforms of a log, and `on_input` the clouds of a topic and the samples of the gyroscope.
+/// Passes the transforms of a log to an odometry, and the clouds of a topic and the gyroscope samples to `on_input`.
 pub fn feed_odometry(
     bag: &BagReader,
     plan: &TopicPlan,

@@ -1,4 +1,4 @@
-//! Static transforms recorded after the first cloud: they apply from the beginning.
+//! Static transforms recorded after the first cloud, which apply from the beginning of a replay.
 
 use std::collections::BTreeMap;
 
@@ -25,7 +25,7 @@ const SAME: f64 = 1e-6;
 pub(super) struct LateStatics {
     /// First transform of each child frame that is recorded after the first cloud.
     pub message: TFMessage,
-    /// A line for each of them, and for each change.
+    /// Log lines: one per late transform, and one per change of a transform.
     pub lines: Vec<String>,
     untold: u64,
 }
@@ -33,7 +33,7 @@ pub(super) struct LateStatics {
 impl LateStatics {
     /// Reads the static transforms of a log with a plan of its topics.
     ///
-    /// A frame with two values has the first one until the second, as in the log.
+    /// A transform with two values has the first one until the time of the second, as in the log.
     pub fn read(bag: &BagReader, plan: &TopicPlan) -> Result<Self, TopicError> {
         let mut found = Self::default();
         let messages = |wanted: fn(Role) -> bool| {

@@ -1,62 +1,62 @@
-//! Roles of topics in a replay, and reasons for which a log cannot be replayed.
+//! Roles of topics in a replay, and errors of logs that cannot be replayed.
 
 use lattice_bag::{BagError, BagReader};
 use thiserror::Error;
 
 use crate::cloud_input::CloudType;
 
-/// Reason for which a log cannot be replayed.
+/// Error of a log that cannot be replayed.
 #[derive(Debug, Error)]
 pub enum TopicError {
-    /// A slice that is empty or begins before the log.
+    /// Slice that is empty or begins before the log.
     #[error(
         "no clouds from {from_s} s to {to_s} s: a slice begins at 0 s or later and ends behind its beginning"
     )]
     Slice {
-        /// Asked for.
+        /// Requested start, s after the start of the log.
         from_s: f64,
-        /// Asked for.
+        /// Requested end, s after the start of the log.
         to_s: f64,
     },
-    /// A topic that was asked for.
+    /// Requested topic that is not in the log.
     #[error("no topic '{name}' of type {type_name} in the log; it has {has}")]
     Missing {
-        /// Asked for.
+        /// Requested name.
         name: String,
-        /// Needed type.
+        /// Required type.
         type_name: &'static str,
         /// Topics of that type, or of any.
         has: String,
     },
-    /// A topic of clouds that was asked for.
+    /// Requested topic without clouds.
     #[error("no topic '{name}' of clouds in the log ({types}); it has {has}{remedy}")]
     MissingClouds {
-        /// Asked for.
+        /// Requested name.
         name: String,
-        /// Types of clouds.
+        /// Supported cloud types.
         types: String,
-        /// Topics of the log.
+        /// Topics of the log with their types.
         has: String,
-        /// Command that makes clouds of what it has; may be empty.
+        /// Command that makes clouds of other topics of the log; may be empty.
         remedy: String,
     },
     /// Nothing to map.
     #[error("no topic of clouds in the log ({types}); it has {has}{remedy}")]
     NoClouds {
-        /// Types of clouds.
+        /// Supported cloud types.
         types: String,
-        /// Topics of the log.
+        /// Topics of the log with their types.
         has: String,
-        /// Command that makes clouds of what it has; may be empty.
+        /// Command that makes clouds of other topics of the log; may be empty.
         remedy: String,
     },
     /// Clouds of several robots.
     #[error("clouds of several robots: {robots}; choose those of one with --points TOPIC")]
     Robots {
-        /// Topics of clouds and of their transforms.
+        /// Robots with the topics of their clouds and transforms.
         robots: String,
     },
-    /// The log itself.
+    /// Error of reading the log.
     #[error(transparent)]
     Bag(#[from] BagError),
 }
@@ -64,9 +64,9 @@ pub enum TopicError {
 /// Role of a topic in the replay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// A sensor's clouds.
+    /// Clouds of a sensor.
     Cloud(CloudType),
-    /// One kind of INS message.
+    /// INS message of this ROS type.
     Ins(&'static str),
     /// `/tf` or, if true, `/tf_static`.
     Transforms(bool),

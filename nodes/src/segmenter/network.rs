@@ -57,7 +57,7 @@ pub enum Values {
 pub struct Scores {
     /// Size of the output.
     pub size: Size,
-    /// Its values.
+    /// Values of the output.
     pub values: Values,
 }
 
@@ -73,7 +73,7 @@ pub enum ModelError {
     /// The file is unreadable.
     #[error("{}: {error}", path.display())]
     File {
-        /// Its path.
+        /// Path of the file.
         path: PathBuf,
         /// Error of the system.
         error: std::io::Error,
@@ -81,9 +81,9 @@ pub enum ModelError {
     /// File size above the limit.
     #[error("{}: {bytes} bytes, more than {max}", path.display())]
     Large {
-        /// Its path.
+        /// Path of the file.
         path: PathBuf,
-        /// Its size.
+        /// Size of the file.
         bytes: u64,
         /// The limit.
         max: u64,

@@ -96,8 +96,8 @@ fn load() -> Result<(), String> {
         let _ = ort::api();
         Ok(())
     }));
-    let loaded = loaded
-        .unwrap_or_else(|_| Err("it does not have the required interface version".to_owned()));
+    let loaded =
+        loaded.unwrap_or_else(|_| Err("it lacks the interface of version 1.17".to_owned()));
     loaded.map_err(|problem| {
         let path = path.display();
         let problem = checks::shown(&problem);

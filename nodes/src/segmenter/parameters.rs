@@ -56,7 +56,9 @@ fn within<T: Send + 'static>(
     loop {
         match made.recv_timeout(POLL) {
             Ok(made) => return Ok(made),
-            Err(RecvTimeoutError::Disconnected) => return Err("it cannot be parsed".to_owned()),
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err("it cannot be parsed: the thread that read it ended".to_owned());
+            }
             Err(RecvTimeoutError::Timeout) if shutdown.is_requested() => {
                 return Err("reading it was interrupted".to_owned());
             }

@@ -366,7 +366,7 @@ impl SemanticIcpServer {
         self.follower.differences()
     }
 
-    /// Voxels of the followed map.
+    /// Number of voxels of the followed map; 0 before its first keyframe.
     pub fn map_voxels(&self) -> usize {
         self.follower.map().map_or(0, |map| map.voxels().len())
     }

@@ -136,7 +136,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             let busy = reply.clone();
             if !to.send(Event::Request(Box::new(request), reply), 0) {
                 busy.send(CalibrateResponse {
-                    message: "busy, ask again".into(),
+                    message: "the inbox of the node is full: call again".into(),
                     ..CalibrateResponse::default()
                 });
             }

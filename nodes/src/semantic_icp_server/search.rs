@@ -145,7 +145,7 @@ pub enum Work {
 /// A search or tracking job.
 #[derive(Clone, Debug)]
 pub struct Job {
-    /// Its number.
+    /// Number of the search.
     pub id: u64,
     /// Learned label confusions are obsolete.
     pub reset_label_confusion: bool,

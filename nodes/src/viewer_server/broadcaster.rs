@@ -63,12 +63,12 @@ pub struct Demand {
 }
 
 impl Broadcaster {
-    /// A broadcaster without channels, for `max_clients`.
+    /// Creates a broadcaster without channels, for up to `max_clients`.
     pub fn new(max_clients: usize) -> Self {
         Self::of("live", max_clients)
     }
 
-    /// A broadcaster for the constant map of a file.
+    /// Creates a broadcaster for the constant map of a file.
     pub fn of_file(max_clients: usize) -> Self {
         Self::of("file", max_clients)
     }
@@ -92,7 +92,7 @@ impl Broadcaster {
         }
     }
 
-    /// Sets the bridge, before the first client connects.
+    /// Sets the bridge; to be called once, before the first client connects. Later calls have no effect.
     pub fn set_bridge(&self, bridge: Box<dyn Bridge>) {
         if self.bridge.set(bridge).is_err() {
             log::debug!("the bridge is set already");
@@ -249,7 +249,7 @@ impl Broadcaster {
         }
     }
 
-    /// The next message for a client.
+    /// Removes the next message from the queue of a client; `None` if there is none, or no such client.
     pub fn next(&self, id: u64) -> Option<Outgoing> {
         let mut inner = lock(&self.inner);
         let Inner {

@@ -14,7 +14,8 @@ pub const MAX_CONNECTIONS: usize = 64;
 /// Limit per address: two pages, each with the six connections that browsers open, and a few more.
 pub const MAX_PER_ADDRESS: usize = 16;
 
-/// Set of connections. Above a limit a new connection displaces the oldest of the address with the most.
+/// Set of connections. A new connection above the limit of its address displaces the oldest of that address; above
+/// the total limit, the oldest of the address with the most.
 #[derive(Default)]
 pub struct ConnectionLimit(RefCell<Places>);
 

@@ -15,7 +15,7 @@ pub struct BroadcasterCounts {
     pub connections_displaced: u64,
     /// Messages sent to clients.
     pub messages_out: u64,
-    /// Their bytes.
+    /// Bytes of these messages.
     pub bytes_out: u64,
     /// Messages dropped for newer ones.
     pub messages_dropped: u64,

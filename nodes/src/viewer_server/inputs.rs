@@ -72,7 +72,7 @@ impl InputRefusal {
 pub struct InputCounts {
     /// Messages published.
     pub headset_in: u64,
-    /// Their bytes.
+    /// Bytes of these messages.
     pub headset_bytes_in: u64,
     /// Messages rejected, by reason.
     pub headset_refused: BTreeMap<&'static str, u64>,

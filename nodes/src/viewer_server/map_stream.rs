@@ -49,7 +49,7 @@ pub enum Cursor {
     Fresh,
     /// Within a keyframe.
     Keyframe {
-        /// Its chunks.
+        /// Chunks of the keyframe.
         chunks: Arc<[Entry]>,
         /// Index of the next chunk.
         next: usize,

@@ -57,7 +57,7 @@ pub struct BatchSums {
     pub squares: u64,
     /// Maximum squared distance.
     pub largest_square: u64,
-    /// True if a point is too far from the origin of the points for 32-bit fixed point.
+    /// True if a point is too far from the origin of its frame for 32-bit fixed point, or the lattice has no kernel.
     pub far: bool,
 }
 
@@ -67,7 +67,8 @@ pub struct BatchBlock<'a> {
     pub codes: &'a [BlockKey],
     /// Quantization error of the points that have a cell.
     pub sums: &'a BatchSums,
-    /// Coordinates of the points by axis, in 2^-20 m modulo 2^32, within one unit; invalid if `sums.far`.
+    /// Coordinates of the points by axis, in the frame of the points: units of 2^-20 m, modulo 2^32, rounded to
+    /// within one unit. Invalid if `sums.far`.
     pub fixed: &'a [[i32; BLOCK]; 3],
 }
 
@@ -130,7 +131,7 @@ impl BatchQuantizer {
 
     /// Writes the lattice index of each point to `indices`, of the same length.
     ///
-    /// Returns the first point without a cell, whose index is invalid.
+    /// Returns the position of the first point without a cell in `points`; the indices of such points are invalid.
     pub fn indices(&self, points: &[[f32; 3]], indices: &mut [LatticeIndex]) -> Option<usize> {
         let (mut bad, mut at, mut rest) = (None, 0, indices);
         self.for_blocks(points, |block, sums| {

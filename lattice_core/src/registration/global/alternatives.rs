@@ -27,8 +27,9 @@ const COMPETITIVE_PER_OBSERVATION: f64 = 1.0;
 impl RegistrationContext<'_> {
     /// Refines the most likely candidate, its best alternatives and its symmetric poses alike.
     ///
-    /// A narrow gate excludes surfaces that only one cloud contains. Each pose is then optimized along its weak
-    /// directions. Likelihoods are comparable only after the same refinement.
+    /// A narrow gate excludes surfaces that only one cloud contains. Poses above the pruning threshold are then
+    /// optimized along their weak directions; the others are dropped. Likelihoods are comparable only after the same
+    /// refinement.
     pub fn search_alternatives(
         &self,
         all: &[Candidate],

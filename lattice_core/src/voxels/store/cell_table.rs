@@ -295,14 +295,18 @@ impl CellTable {
         let set = blocks.iter().flat_map(|block| &block.leaf);
         let set: usize = set.map(|word| word.count_ones() as usize).sum();
         let capacities = blocks.iter().map(|block| block.numbers.capacity());
-        if capacities.sum::<usize>() * size_of::<u32>() != self.number_bytes {
-            return Err("the memory of the blocks is miscounted".to_owned());
+        let bytes = capacities.sum::<usize>() * size_of::<u32>();
+        if bytes != self.number_bytes {
+            return Err(format!(
+                "{} bytes are counted for the blocks, their lists have {bytes}",
+                self.number_bytes
+            ));
         }
         if listed == self.rows.len() && set == listed {
             Ok(())
         } else {
             Err(format!(
-                "{listed} cells listed and {set} set for {} voxels",
+                "blocks list {listed} cells and have {set} bits set, expected {} of each, one per voxel",
                 self.rows.len()
             ))
         }

@@ -73,7 +73,7 @@ struct Weak {
 struct Part {
     /// missing, floating, beside or hidden.
     kind: &'static str,
-    /// Its centroid, metres.
+    /// Centroid of the region, metres.
     place_m: [f64; 3],
     points: usize,
     /// Distance from the surfaces of the map, metres.

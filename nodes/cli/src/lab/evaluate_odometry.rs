@@ -26,7 +26,7 @@ pub struct OfDrives {
     #[arg(long, value_name = "LOG", requires = "truth")]
     log: Option<PathBuf>,
     /// True poses, `stamp x y z qx qy qz qw` in each line, of `base_link` where transforms connect it with the clouds,
-    /// else of their frame; interpolated over 0.25 s at most
+    /// else of their frame; gaps above 0.25 s are not interpolated
     #[arg(long, value_name = "TUM", requires = "log")]
     truth: Option<PathBuf>,
     /// Topic of the clouds; by default that with the most clouds

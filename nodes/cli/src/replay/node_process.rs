@@ -186,7 +186,7 @@ impl NodeProcess {
     fn ended(&mut self, status: ExitStatus) -> Box<dyn Error + Send + Sync> {
         self.seen.extend(self.lines.try_iter());
         let words = self.seen.last().map_or("", String::as_str);
-        format!("{} ended with {status}; last log lines: {words}", self.name).into()
+        format!("{} ended with {status}; last log line: {words}", self.name).into()
     }
 }
 

@@ -17,7 +17,7 @@ const SCAN_BYTES: usize = 32;
 pub struct ScanRecord {
     /// Position of the scanner, m.
     pub origin_m: Vector3<f64>,
-    /// Points of the scan; scans follow each other in the file.
+    /// Number of points of the scan; scans are consecutive in the file.
     pub points: usize,
 }
 
@@ -28,7 +28,7 @@ impl ScanRecord {
     }
 }
 
-/// Place of the scans of a point file: `.scans` added to its name.
+/// Path of the scans of a point file: its name with `.scans` added.
 pub fn scans_path(points: &Path) -> PathBuf {
     let mut name = OsString::from(points);
     name.push(".scans");

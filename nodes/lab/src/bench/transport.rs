@@ -19,47 +19,47 @@ use crate::AnyError;
 use crate::options::within;
 
 const TOPIC: &str = "/points";
-/// For the match and for each message, and for the first one of the other side.
+/// Limit of the wait for a match, for each message, and for the first line of the other process.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Messages to send.
+/// Workload of the measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct TransportSetup {
-    /// Bytes of points in a message.
+    /// Size of the point data of a message, bytes.
     pub bytes: usize,
-    /// Messages a second.
+    /// Publication rate, Hz.
     pub rate_hz: f64,
-    /// Messages in all.
+    /// Number of messages.
     pub count: u64,
-    /// Best effort in place of reliable.
+    /// True for best effort, false for reliable.
     pub best_effort: bool,
 }
 
 /// Result of the receiving process.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Received {
-    /// Messages received.
+    /// Number of messages received.
     pub heard: u64,
-    /// From the call of `publish` to the handler's: median, ms.
+    /// Median latency from the call of `publish` to the call of the handler, ms.
     pub median_ms: f64,
-    /// 99th of a hundred, ms.
+    /// 99th percentile of the latency, ms.
     pub p99_ms: f64,
-    /// The longest, ms.
+    /// Maximum latency, ms.
     pub max_ms: f64,
     /// Processor time of the process from the first message to the last, s.
     pub cpu_s: f64,
 }
 
-/// Result of both.
+/// Result of both processes.
 #[derive(Clone, Debug, Serialize)]
 pub struct TransportReport {
-    /// The transport, by its name in `RMW_IMPLEMENTATION`.
+    /// Name of the transport in `RMW_IMPLEMENTATION`.
     pub transport: &'static str,
-    /// Messages sent.
+    /// Number of messages sent.
     pub sent: u64,
     /// Processor time of the sending process, s.
     pub cpu_s: f64,
-    /// The other end.
+    /// Result of the receiving process.
     pub received: Received,
 }
 
@@ -89,7 +89,8 @@ fn node(domain: u16, name: &str) -> Result<(Runtime, Node, &'static str), AnyErr
     Ok((runtime, node, network.transport.name()))
 }
 
-/// Sends to a process that `listener` starts, given the domain, and that runs [`listen`].
+/// Measures the transport: `listener` makes the command of a process on the given domain, which calls [`listen`], and
+/// this process publishes.
 pub fn send(
     setup: TransportSetup,
     listener: impl FnOnce(u16) -> Command,
@@ -127,7 +128,7 @@ pub fn send(
     Ok(report)
 }
 
-/// Subscribes in a domain and prints what it received, as a line for [`send`].
+/// Subscribes on a domain and prints the result as one line for [`send`].
 pub fn listen(setup: TransportSetup, domain: u16) -> Result<(), AnyError> {
     let (_runtime, node, _) = node(domain, "listener")?;
     let (sender, heard) = channel();

@@ -25,12 +25,12 @@ use crate::{AnyError, at};
 pub const TRUTH_FILE: &str = "truth.tum";
 const TOPIC: &str = "/points";
 const FRAME: &str = "lidar";
-/// x, y, z (f32) and t (u32).
+/// Bytes of a point: x, y, z (f32) and t (u32).
 const POINT_STEP: u32 = 16;
 /// Time between true poses, ns.
 const TRUTH_NS: usize = 10_000_000;
 
-/// Choices of a log.
+/// Options of a simulated log.
 #[derive(Clone, Debug)]
 pub struct DriveLogOptions {
     /// Directory of the log.
@@ -41,7 +41,7 @@ pub struct DriveLogOptions {
     pub scene: DriveScene,
     /// Seed of the scene and the noise.
     pub seed: u64,
-    /// Length of the log, s; `None`: the whole drive.
+    /// Duration of the log, s; `None`: the whole drive.
     pub duration_s: Option<f64>,
 }
 
@@ -50,9 +50,9 @@ pub struct DriveLogOptions {
 pub struct DriveLogSummary {
     /// Directory of the log.
     pub out: PathBuf,
-    /// Scans.
+    /// Number of scans.
     pub scans: u64,
-    /// Points of all scans.
+    /// Number of points of all scans.
     pub points: u64,
     /// File of the true poses.
     pub truth: PathBuf,
@@ -69,7 +69,8 @@ impl fmt::Display for DriveLogSummary {
     }
 }
 
-/// Drives through a scene and writes the log as a rosbag2 directory, the truth in it. `progress` gets the share done.
+/// Simulates a drive through a scene, and writes the log as a rosbag2 directory with the true poses in it. `progress`
+/// gets the completed fraction.
 pub fn write_drive(
     options: &DriveLogOptions,
     progress: &mut dyn FnMut(f64),
@@ -128,7 +129,7 @@ pub fn write_drive(
     Ok(summary)
 }
 
-/// A scan as a driver publishes it, stamped with the time of its first shot.
+/// Message of a scan as a driver publishes it, stamped with the time of its first shot.
 fn cloud(scan: &DriveScan) -> PointCloud2 {
     let first_ns = scan.times_ns.first().copied().unwrap_or(scan.end_ns);
     let mut fields = xyz_fields(PointField::FLOAT32, 4);

@@ -17,9 +17,9 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Name of the robot's map in the folder.
+/// File name of the robot's map.
 pub const MAP_FILE: &str = "map.lattice";
-/// Name of the list of classes.
+/// File name of the class list.
 pub const CLASSES_FILE: &str = "classes.yaml";
 
 /// Axes of the headset's clouds.
@@ -36,25 +36,25 @@ pub enum HeadsetAxes {
 /// Options of a simulated house.
 #[derive(Clone, Debug)]
 pub struct HouseOptions {
-    /// The folder.
+    /// Output folder.
     pub out: PathBuf,
     /// True to replace files of an earlier run.
     pub overwrite: bool,
-    /// A mesh instead of our own house, with the names of its classes.
+    /// Mesh that replaces the built-in house, and the names of its classes.
     pub mesh: Option<(PathBuf, PathBuf)>,
     /// Pose of the house in the map.
     pub map_from_house: Isometry3<f64>,
-    /// Seed of everything; the same seed gives the same bytes.
+    /// Seed of the simulation; equal seeds give equal bytes.
     pub seed: u64,
-    /// The robot.
+    /// Robot of the survey.
     pub survey: SurveyOptions,
     /// Pictures of each scene, 1 to 6.
     pub headset_scans: usize,
-    /// Share of the headset's view whose regions are labelled wrongly, 0 to 1.
+    /// Fraction of the headset's view with wrong labels, by regions, 0 to 1.
     pub flips: f64,
     /// Lattice of the map.
     pub lattice: LatticeKind,
-    /// Side of a cube of the volume of its cells, m.
+    /// Cell size: edge of the cube of equal volume, m.
     pub cell_side_m: f64,
     /// Axes of the headset's clouds.
     pub axes: HeadsetAxes,
@@ -63,17 +63,17 @@ pub struct HouseOptions {
 /// Summary of a written house.
 #[derive(Clone, Debug, PartialEq, Default, Serialize)]
 pub struct HouseSummary {
-    /// The folder.
+    /// Output folder.
     pub out: PathBuf,
-    /// Triangles of the house.
+    /// Number of triangles of the house.
     pub triangles: usize,
-    /// Points of the robot's survey.
+    /// Number of points of the robot's survey.
     pub survey_points: usize,
-    /// Voxels of its map.
+    /// Number of voxels of its map.
     pub voxels: usize,
-    /// Points of each headset cloud, by file.
+    /// Number of points of each headset cloud, by file.
     pub headset_points: BTreeMap<String, usize>,
-    /// Share of the headset's points in regions whose labels differ between headset and map.
+    /// Fraction of the headset's points in regions with different labels in headset and map.
     pub different_share: f64,
 }
 
@@ -95,40 +95,40 @@ impl fmt::Display for HouseSummary {
     }
 }
 
-/// Truth that is written beside the clouds of a scene.
+/// Ground truth of a scene, written beside its clouds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneTruth {
     /// Name of the scene.
     pub scene: String,
     /// Seed of the simulation.
     pub seed: u64,
-    /// Axes of the clouds and of `sensor_m`; the truth is always in ROS axes.
+    /// Axes of the clouds and of `sensor_m`; the ground truth always has ROS axes.
     pub axes: HeadsetAxes,
-    /// A cloud for each headset scan, in the same frame.
+    /// Headset scans, all in one frame.
     pub headset_scans: Vec<HeadsetScanTruth>,
-    /// The pose that a calibration looks for.
+    /// True pose of the headset in the map.
     pub map_from_headset: Pose,
-    /// Side of a voxel of the headset's mesh, m.
+    /// Edge of a voxel of the headset's mesh, m.
     pub voxel_m: f64,
-    /// Scale of the headset's distances.
+    /// Scale factor of the simulated distances from the headset; 1 is exact.
     pub scale: f64,
 }
 
-/// One cloud.
+/// Cloud of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeadsetScanTruth {
-    /// File in the same folder.
+    /// File name in the same folder.
     pub cloud: String,
     /// Position of the camera in the frame of the cloud, m.
     pub sensor_m: [f64; 3],
 }
 
-/// A rigid transform.
+/// Rigid transform.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// m.
+    /// Translation, m.
     pub translation_m: [f64; 3],
-    /// Quaternion.
+    /// Unit quaternion x, y, z, w.
     pub rotation_xyzw: [f64; 4],
 }
 
@@ -189,10 +189,10 @@ fn place(options: &HouseOptions, name: &str) -> Result<PathBuf, AnyError> {
     free_place(&options.out, name, options.overwrite)
 }
 
-/// Place of a file in a folder.
+/// Path of a new file in a folder.
 ///
 /// # Errors
-/// If there is one already that is not to be replaced.
+/// If the file exists and must not be replaced.
 pub(super) fn free_place(folder: &Path, name: &str, overwrite: bool) -> Result<PathBuf, AnyError> {
     let path = folder.join(name);
     if path.exists() && !overwrite {

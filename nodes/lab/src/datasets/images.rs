@@ -27,18 +27,19 @@ const MAX_IMAGES: f64 = 1e6;
 pub enum ImageCamera {
     /// The robot's, on its walk.
     Robot,
-    /// The headset's, of someone who looks at things.
+    /// Camera poses of a headset that views objects.
     Headset,
 }
 
 /// Houses of a set of images.
 #[derive(Clone, PartialEq, Debug)]
 pub enum ImageHouses {
-    /// One drawn anew for each so many images, see [`House::drawn`].
+    /// Generated house, drawn anew for every `per_house` images, see [`House::drawn`].
     Drawn,
-    /// The same rooms, see [`House::generated`], with other clutter and another look for each so many images.
+    /// Generated house with fixed rooms, see [`House::generated`], and new clutter and materials for every
+    /// `per_house` images.
     Generated,
-    /// A mesh and the names of its classes, with another look for each so many images.
+    /// Mesh and the names of its classes, with new materials for every `per_house` images.
     Mesh(PathBuf, PathBuf),
 }
 
@@ -51,7 +52,7 @@ pub struct ImagesOptions {
     pub overwrite: bool,
     /// Houses that are seen.
     pub houses: ImageHouses,
-    /// Images of one house and look.
+    /// Number of images of one house and its materials.
     pub per_house: usize,
     /// Images.
     pub count: usize,
@@ -72,7 +73,7 @@ pub struct ImageEntry {
     pub labels: String,
     /// File of its true depth along the camera's axis, 16 bits, mm; 0 where nothing is within 65 m.
     pub depth: String,
-    /// Seed of the house and its look.
+    /// Seed of the house and its materials.
     pub house_seed: u64,
     /// Pose of the camera: x forward, y left, z up.
     pub house_from_camera: Pose,
@@ -102,7 +103,7 @@ pub struct ImagesSummary {
     pub out: PathBuf,
     /// Images in it.
     pub images: usize,
-    /// Houses and looks that they are of.
+    /// Number of houses, each with its materials.
     pub houses: usize,
     /// Pixels of each class, by name, share of all.
     pub shares: BTreeMap<String, f64>,

@@ -17,10 +17,10 @@ use crate::options::within;
 use crate::random::Stream;
 use crate::report::{Cell as Entry, Report, Section, Table};
 
-/// Largest distance, in cells, of a point that the map has as well.
+/// Distance up to which a point has a counterpart in the map, in cells.
 const SHARED_CELLS: f64 = 2.0;
 
-/// Two scans of a place, and how one is calibrated in the other.
+/// Two scans of a place and the pose of one in the other.
 pub struct Scans {
     map: CalibrationMap,
     cell_side_m: f64,
@@ -29,7 +29,7 @@ pub struct Scans {
     options: CalibrationOptions,
 }
 
-/// Looks from the place of a scan that see a part of the circle.
+/// Partial scan: a sector of the full circle.
 #[derive(Clone, Copy)]
 pub struct Part<'a> {
     scans: &'a Scans,
@@ -37,7 +37,8 @@ pub struct Part<'a> {
 }
 
 impl Scans {
-    /// Two scans with the pose of the second one, or that which a calibration of all its points finds.
+    /// Creates the pair with the given pose of the second scan, or with the result of a calibration of all its
+    /// points.
     ///
     /// The sensor stands at the origin of the scan unless its place is given.
     ///
@@ -71,7 +72,7 @@ impl Scans {
         match found.verdict {
             Verdict::Ok => Ok(found.target_from_source),
             verdict => Err(format!(
-                "the whole scan is {}: {}; give its pose",
+                "no pose of the whole scan, verdict {}: {}; give it by --truth FILE",
                 verdict.name(),
                 found.reason
             )
@@ -79,10 +80,10 @@ impl Scans {
         }
     }
 
-    /// Looks that see so many degrees of the circle each.
+    /// Partial scans with the given sector angles, degrees.
     ///
     /// # Errors
-    /// If a number is not from 1 to 360.
+    /// Sector angle outside 1..=360.
     pub fn parts(&self, widths_deg: &[f64]) -> Result<Vec<Part<'_>>, AnyError> {
         for width in widths_deg {
             within("widths", *width, 1.0, 360.0)?;
@@ -151,7 +152,7 @@ impl Case for Part<'_> {
     }
 }
 
-/// A table of the parts by how much of the circle they see.
+/// Table of results by sector angle.
 pub fn scans_report(trials: &[Trial]) -> Report {
     let mut scenes = of_scenes(trials);
     scenes.push(("all".to_owned(), trials.iter().collect()));

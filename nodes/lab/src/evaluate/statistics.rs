@@ -26,7 +26,7 @@ impl Share {
         Share::new(k, n)
     }
 
-    /// "75.0 % of 4 [30.1, 95.4]", with so many digits; a dash for none of none.
+    /// Text such as "75.0 % of 4 [30.1, 95.4]" with `digits` decimals; a dash without values.
     pub fn text(&self, digits: usize) -> String {
         let Some(share) = self.share else {
             return "-".to_owned();

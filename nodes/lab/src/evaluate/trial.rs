@@ -29,7 +29,7 @@ pub struct Trial {
     pub tilt_deg: f64,
     /// The error ||log(T* T_GT^-1)||, as the paper prints it.
     pub d_se3: f64,
-    /// Its left form ||log(T_GT^-1 T*)||.
+    /// Left form ||log(T_GT^-1 T*)|| of d_SE3.
     pub d_se3_left: f64,
     /// Mean distance of the seen points from where they should be, metres.
     pub view_m: f64,
@@ -48,9 +48,9 @@ pub struct Trial {
 /// Shares of labels that are right.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct LabelsRight {
-    /// Of the voxels of the map, by their most frequent label.
+    /// Fraction for the voxels of the map, by their most frequent label.
     pub map: f64,
-    /// Of the points of the headset.
+    /// Fraction for the points of the headset.
     pub headset: f64,
 }
 

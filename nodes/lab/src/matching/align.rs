@@ -7,34 +7,36 @@ use lattice_core::lattice::Lattice;
 use lattice_core::voxels::{OccupancyList, VoxelStore};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-/// Error of a map without a voxel.
+/// Error for a map without voxels.
 pub(super) const EMPTY_MAP: &str = "the map is empty";
 
-/// A pose of a scan and its fit.
+/// Pose of a scan and its fit.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Alignment {
     pub map_from_cloud: Isometry3<f64>,
-    /// Points of the sample in occupied cells of the finest level.
+    /// Number of points of the sample in occupied cells of the finest level.
     pub hits: usize,
     pub points: usize,
     pub evaluations: usize,
 }
 
-/// Most steps on one level, and of each of the last climbs, on the finest level; the numbers of the original.
+/// Step limits: per level, and of each final climb on the finest level; as in the original.
 const LEVEL_STEPS: usize = 20;
 const FINE_STEPS: usize = 100;
-/// Last climbs, each by shorter steps than the one before by this factor; the original has one.
+/// Number of final climbs, each with steps shorter by this factor; the original has one.
 const FINE_STAGES: usize = 2;
 const FINE_STEP: f64 = 0.25;
-/// Turn of one step on the finest level, degrees; twice as much from one level to the next.
+/// Rotation step on the finest level, degrees; it doubles from level to level.
 const STEP_DEG: f64 = 0.5;
 
-/// Aligns a scan with a map from a guess: climbs on every level, the coarsest first, by steps of a
-/// cell side, then refines on the finest by a fraction of its steps, on another sample of the scan.
+/// Aligns a scan with a map from a guess: climbs on every level, coarsest first, with steps of a cell size, then
+/// refines on the finest level with fractions of them, on another sample of the scan.
 ///
-/// Each level looks at one point of a cell of its own size, drawn from one of each finest cell. A step goes along or about one axis of the
-/// map; turns are about the middle of those points, so that they do not shift the scan as well. Fails
-/// for an empty map, a scan without points and a guess that is not finite.
+/// Each level uses one point per cell of its own size, drawn from one per finest cell. A step goes along or about one
+/// axis of the map. Rotations are about the centroid of those points, so that they do not translate the scan.
+///
+/// # Errors
+/// For an empty map, a scan without points, and a guess that is not finite.
 pub fn align(
     map: &MultiResolutionList,
     cloud: &Cloud,
@@ -68,8 +70,7 @@ pub fn align(
     })
 }
 
-/// Checks what a search begins with and gives the pose of the offsets of the cloud, whose datum is
-/// then its origin.
+/// Checks the input of a search, and returns the pose of the offsets of the cloud; its datum is then the origin.
 pub(super) fn begin(
     map: &MultiResolutionList,
     cloud: &Cloud,
@@ -116,8 +117,8 @@ struct Top {
     evaluations: usize,
 }
 
-/// Goes to the best of the twelve poses one step away as long as it is better; of equally good ones to
-/// the first. `(sides, turn_deg, most)`: step length in cell sides, turn in degrees, most steps.
+/// Climbs to the best of the twelve poses one step away as long as it is better; among equals, to the first. `(sides,
+/// turn_deg, most)`: step length in cell sizes, rotation in degrees, step limit.
 fn climb(
     top: Top,
     list: &OccupancyList,
@@ -159,15 +160,15 @@ fn climb(
     }
 }
 
-/// The mean of points, metres.
+/// Mean of points, metres.
 pub(super) fn middle_m(points_m: &[[f32; 3]]) -> Point3<f64> {
     let points = points_m.iter().map(|p| Vector3::from(p.map(f64::from)));
     let sum: Vector3<f64> = points.sum();
     (sum / points_m.len().max(1) as f64).into()
 }
 
-/// A pose shifted along the axes of the map (metres) and turned by a rotation vector (radians) about
-/// where it puts a point (metres).
+/// Pose translated along the axes of the map (metres) and rotated by a rotation vector (radians) about the
+/// transformed position of a point (metres).
 pub(super) fn moved(
     pose: &Isometry3<f64>,
     about_m: &Point3<f64>,

@@ -6,21 +6,20 @@ use lattice_core::lattice::Lattice;
 use lattice_core::voxels::{InsertReport, OccupancyList, VoxelStore};
 use nalgebra::Vector3;
 
-/// Most levels of a list.
+/// Limit of levels of a list.
 const MAX_LEVELS: usize = 12;
 
-/// Occupied cells of one lattice at several sizes: level 0 is the finest, each next one has cells of
-/// twice the side.
+/// Occupied cells of one lattice at several sizes: level 0 is the finest, and the cell size doubles from level to
+/// level.
 ///
-/// Every point is quantized at every level: a coarse list is not made from a finer one, whose cells
-/// do not nest in it.
+/// Every point is quantized at every level, since the cells of a finer level do not nest in those of a coarser one.
 #[derive(Clone, Debug)]
 pub struct MultiResolutionList {
     levels: Vec<OccupancyList>,
 }
 
 impl MultiResolutionList {
-    /// An empty list of so many levels, the finest with the cells of `finest`, their datums near
+    /// Creates an empty list of `levels` levels, the finest with the cells of `finest`, their datums near
     /// `datum_near_m` (map frame, metres). All levels together hold at most `max_bytes`.
     pub fn new(
         finest: &Lattice,
@@ -43,7 +42,7 @@ impl MultiResolutionList {
         Ok(MultiResolutionList { levels: levels? })
     }
 
-    /// Adds a cloud to every level; what became of its points, the finest level first.
+    /// Adds a cloud to every level; returns the counts of its points by level, finest first.
     ///
     /// The outcome does not depend on the number of threads.
     pub fn insert(&mut self, cloud: &Cloud) -> Vec<InsertReport> {
@@ -51,7 +50,7 @@ impl MultiResolutionList {
         levels.map(|list| list.insert(cloud)).collect()
     }
 
-    /// The lists, the finest first; never none.
+    /// Lists by level, finest first; at least one.
     pub fn levels(&self) -> &[OccupancyList] {
         &self.levels
     }

@@ -3,13 +3,13 @@
 use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice};
 use nalgebra::Isometry3;
 
-/// Most points of a scan.
+/// Limit of points of a scan.
 pub const MAX_POINTS: usize = u32::MAX as usize;
 
-/// One point of each cell that the points (metres) lie in, at most `most`, in the order of the cells.
+/// Draws one point (metres) of each occupied cell, at most `most`, in the order of the cells.
 ///
-/// The point of a cell, and the cells if there are too many, are drawn by `round`: another round
-/// is another sample. Points without a cell, and those beyond [`MAX_POINTS`], are left out.
+/// The point of a cell, and the cells if there are too many, are drawn by `round`: another round is another sample.
+/// Points without a cell, and those beyond [`MAX_POINTS`], are ignored.
 pub fn sample(points_m: &[[f32; 3]], lattice: &Lattice, most: usize, round: u64) -> Vec<[f32; 3]> {
     let quantizer = BatchQuantizer::new(lattice, Isometry3::identity());
     let mut drawn: Vec<(BlockKey, u64)> = Vec::with_capacity(points_m.len().min(MAX_POINTS));
@@ -34,7 +34,7 @@ pub fn sample(points_m: &[[f32; 3]], lattice: &Lattice, most: usize, round: u64)
     drawn.iter().filter_map(point).collect()
 }
 
-/// A number that looks random (the finisher of splitmix64).
+/// Pseudo-random number (the finalizer of splitmix64).
 fn mix(number: u64, round: u64) -> u64 {
     let mut z = number.wrapping_add(round.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

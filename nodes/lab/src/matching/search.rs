@@ -1,4 +1,4 @@
-//! Trying all poses about a guess.
+//! Search of poses around a guess.
 
 use super::align::{EMPTY_MAP, begin, end, moved, sample_of};
 use super::{Alignment, MultiResolutionList};
@@ -8,35 +8,36 @@ use lattice_core::voxels::VoxelStore;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
-/// Half the widths of what is searched, about a pose; 0 keeps an axis as it is.
+/// Half widths of the searched range around a pose; 0 keeps an axis fixed.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Spread {
-    /// Along the axes of the map, metres.
+    /// Translation along the axes of the map, metres.
     pub translation_m: [f64; 3],
-    /// About the axes of the map through the datum of the scan, which should be where the scanner
-    /// was (a rotation vector), radians, at most pi.
+    /// Rotation vector about the axes of the map through the datum of the scan, radians, at most pi. The datum should
+    /// be the position of the scanner.
     pub rotation_rad: [f64; 3],
 }
 
-/// Most points of the scan that are looked at, one of a cell; the numbers of the original.
+/// Limit of searched points of a scan, one per cell; as in the original.
 const SEARCHED_POINTS: usize = 2000;
-/// Poses kept of a level, and given in the end.
+/// Number of poses kept per level and returned.
 pub(super) const KEEP: usize = 100;
-/// Distance of the features, at which a turn moves a point as far as a shift does, metres.
+/// Range of the features, at which a rotation step displaces a point as far as a translation step, metres.
 const FEATURE_RANGE_M: f64 = 8.0;
-/// Most poses of the coarsest grid; it takes 8 bytes for each.
+/// Limit of poses of the coarsest grid, at 8 bytes each.
 const MAX_POSES: f64 = 5e6;
 
-/// Poses about a middle: three shifts (metres), then a rotation vector (radians).
+/// Offset from a central pose: three translations (metres), then a rotation vector (radians).
 type Offset = [f64; 6];
 
-/// The best poses of a scan within a spread about a guess, the best first, at most [`KEEP`].
+/// Best poses of a scan in a range around a guess, best first; at most [`KEEP`].
 ///
-/// On the coarsest level the poses of a grid are tried, one cell side apart and, in turn, a cell side
-/// over the range of the features. The best are kept and divided in two along every axis that is
-/// searched, level by level. Of
-/// equally good poses the first of the grid comes first, on any number of threads. Fails as
-/// [`align`](super::align) does, and for a grid of too many poses.
+/// The coarsest level tests a grid of poses, one cell size apart and, in rotation, a cell size over the range of the
+/// features. The best ones are kept and halved along every searched axis, level by level. Among equally good poses,
+/// the first of the grid comes first, for any number of threads.
+///
+/// # Errors
+/// As [`align`](super::align), and for a grid of too many poses.
 pub fn search(
     map: &MultiResolutionList,
     cloud: &Cloud,
@@ -90,7 +91,7 @@ pub fn search(
     Ok(kept.iter().map(alignment).collect())
 }
 
-/// The best `keep` of `n` poses, the best first; of equally good ones the first.
+/// Best `keep` of `n` poses, best first; among equals, the first.
 fn best_of(
     n: usize,
     at: impl Fn(usize) -> Offset + Sync,
@@ -113,7 +114,7 @@ fn best_of(
     places.into_iter().map(found).collect()
 }
 
-/// A regular grid of offsets over a spread: each stands in the middle of its share.
+/// Regular grid of offsets over a range: each is the centre of its part.
 struct Grid {
     counts: [f64; 6],
     half: Offset,
@@ -121,7 +122,7 @@ struct Grid {
 }
 
 impl Grid {
-    /// Steps are at most so long.
+    /// Upper bound of the step size.
     fn new(spread: &Spread, step_m: f64, step_rad: f64) -> Grid {
         let [x, y, z] = spread.translation_m;
         let [a, b, c] = spread.rotation_rad;
@@ -152,8 +153,7 @@ impl Grid {
     }
 }
 
-/// The middles of the halves of an offset's share along every axis that has one; `spacing` is that of
-/// the halves.
+/// Centres of the halves of the part of an offset, along every searched axis; `spacing` is that of the halves.
 fn divided(parent: &Offset, spacing: &Offset) -> Vec<Offset> {
     let mut children = vec![*parent];
     for (axis, spacing) in spacing.iter().enumerate() {

@@ -230,7 +230,7 @@ pub enum Cell {
     Empty,
 }
 
-/// Numbers with so many digits after the point.
+/// Numbers with `digits` decimals.
 pub fn numbers<const N: usize>(digits: usize, values: [f64; N]) -> [Cell; N] {
     values.map(|value| Cell::Number(value, digits))
 }
@@ -252,7 +252,7 @@ impl Cell {
     }
 }
 
-/// A number with so many digits after the point; a dash for what is no number.
+/// Number with `digits` decimals; a dash if it is not finite.
 fn number(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return "–".to_owned();

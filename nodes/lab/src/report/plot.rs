@@ -1,4 +1,4 @@
-//! Pictures of reports: panels beside a key of the colours, charts, curves and box plots in them.
+//! Figures of reports: panels with charts, curves and box plots, and a legend.
 
 use lattice_core::lattice::LatticeKind;
 use plotters::coord::Shift;
@@ -9,18 +9,18 @@ use std::ops::Range;
 use crate::AnyError;
 use crate::evaluate::{median_interval, quantile};
 
-/// An area of a picture.
+/// Drawing area of a figure.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// A chart whose axes are of `X` and `Y`.
+/// Chart with axes of types `X` and `Y`.
 pub type Chart<'a, X, Y> = ChartContext<
     'a,
     SVGBackend<'a>,
     Cartesian2d<<X as AsRangedCoord>::CoordDescType, <Y as AsRangedCoord>::CoordDescType>,
 >;
-/// A colour and its meaning.
+/// Colour and text of a legend entry.
 pub type Key<'a> = (RGBColor, &'a str);
 
-/// Panels of a size (pixels) in columns and rows, and on their right a key of `key_width` pixels.
+/// Panels of one size (pixels) in columns and rows, with a legend of `key_width` pixels on their right.
 #[derive(Clone, Copy, Debug)]
 pub struct Layout<'a> {
     panel: (u32, u32),
@@ -41,7 +41,7 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// The picture as an `<svg>` element; `draw` gets its panels row by row.
+/// Draws a figure as an `<svg>` element; `draw` gets the panels row by row.
 pub fn svg(
     layout: &Layout,
     draw: impl FnOnce(&[Area]) -> Result<(), AnyError>,
@@ -65,7 +65,8 @@ pub fn svg(
     Ok(text)
 }
 
-/// A chart with a title and named axes that fills a panel; below it numbers, or names of 0, 1, 2 and so on.
+/// Chart that fills a panel, with a title and named axes. The x axis has numbers, or the given names at 0, 1, 2 and
+/// so on.
 pub fn chart<'a, X, Y>(
     area: &Area<'a>,
     title: &str,
@@ -103,11 +104,11 @@ where
     Ok(chart)
 }
 
-/// Approximate number of labels at an axis.
+/// Approximate number of tick labels of an axis.
 const TICKS: usize = 7;
 
-/// Numbers at an axis: all with as many digits as they need, or each with its own if it is logarithmic. An
-/// axis with zero in the middle is one of changes, with signs.
+/// Formatter of tick labels: all with the same number of digits, or each with its own on a logarithmic axis. Labels
+/// have signs if zero is in the middle of the axis.
 fn labels<A: Ranged<ValueType = f64>>(axis: &A) -> impl Fn(&f64) -> String + use<A> {
     let Range { start, end } = axis.range();
     let even = axis.map(&f64::midpoint(start, end), (0, 1000)) == 500;
@@ -124,7 +125,7 @@ fn labels<A: Ranged<ValueType = f64>>(axis: &A) -> impl Fn(&f64) -> String + use
     }
 }
 
-/// A lattice's colour, one of those that colour-blind people distinguish (Wong 2011).
+/// Colour of a lattice, from the colour-blind safe palette of Wong (2011).
 pub fn color(kind: LatticeKind) -> RGBColor {
     match kind {
         LatticeKind::Cubic => BLACK,
@@ -137,7 +138,7 @@ pub fn color(kind: LatticeKind) -> RGBColor {
     }
 }
 
-/// A lattice's name as people write it.
+/// Display name of a lattice.
 pub fn title(kind: LatticeKind) -> &'static str {
     match kind {
         LatticeKind::Cubic => "cubic",
@@ -150,16 +151,16 @@ pub fn title(kind: LatticeKind) -> &'static str {
     }
 }
 
-/// Colours and names of lattices.
+/// Legend entries of lattices.
 pub fn key(kinds: &[LatticeKind]) -> Vec<Key<'static>> {
     let of = |&kind: &LatticeKind| (color(kind), title(kind));
     kinds.iter().map(of).collect()
 }
 
-/// A line of a colour.
+/// Colour and points of a curve.
 pub type Curve = (RGBColor, Vec<(f64, f64)>);
 
-/// Lines in one panel.
+/// Draws curves in a panel.
 pub fn curves(
     area: &Area,
     title: &str,
@@ -175,10 +176,11 @@ pub fn curves(
     Ok(())
 }
 
-/// Values from which a cumulative curve is drawn by its quantiles.
+/// Number of values above which a cumulative curve is drawn by its quantiles.
 const MANY: usize = 200;
 
-/// The share of values up to each of them: as steps, or as a line where they are many.
+/// Empirical cumulative distribution as points (value, fraction): a step function, or a polyline of 200 quantiles for
+/// many values.
 pub fn cumulative(values: &[f64]) -> Vec<(f64, f64)> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -197,22 +199,22 @@ pub fn cumulative(values: &[f64]) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Numbers of a box plot (Tukey 1977).
+/// Statistics of a box plot (Tukey 1977).
 #[derive(Clone, PartialEq, Debug)]
 pub struct BoxStats {
     pub lower: f64,
     pub median: f64,
-    /// 95 % interval of the median.
+    /// 95 % confidence interval of the median.
     pub median_interval: [f64; 2],
     pub upper: f64,
-    /// The last values within 1.5 interquartile ranges of the box.
+    /// Smallest and largest value within 1.5 interquartile ranges of the box.
     pub whiskers: [f64; 2],
-    /// Values beyond the whiskers, in order.
+    /// Values beyond the whiskers, in ascending order.
     pub outliers: Vec<f64>,
 }
 
 impl BoxStats {
-    /// Numbers of the finite ones of some values; None of no values.
+    /// Statistics of the finite values; `None` if there are none.
     pub fn of(values: &[f64]) -> Option<BoxStats> {
         let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
@@ -233,11 +235,11 @@ impl BoxStats {
     }
 }
 
-/// A box with its name and colour.
+/// Name, colour and statistics of a box.
 pub type NamedBox = (&'static str, RGBColor, BoxStats);
 
-/// Boxes beside each other: whiskers at 1.5 interquartile ranges, outliers as dots, the interval of the
-/// median as a darker band, a cross at the mark of a box. What lies above the panel is counted there.
+/// Draws box plots side by side: whiskers at 1.5 interquartile ranges, outliers as dots, the confidence interval of
+/// the median as a darker band, and a cross at the mark of a box. Values above the panel are counted at its top.
 pub fn boxes(
     area: &Area,
     title: &str,

@@ -110,7 +110,8 @@ impl Site {
         &self.obstacles
     }
 
-    /// First surface along a ray (unit `direction`) within `max_range_m`; nothing lies outside the site.
+    /// First surface along a ray from `origin` (metres, map frame) in the unit vector `direction` within
+    /// `max_range_m`; `None` outside the site.
     pub fn cast(
         &self,
         origin: &Vector3<f64>,

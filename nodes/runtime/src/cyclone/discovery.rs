@@ -311,7 +311,7 @@ unsafe extern "C" fn on_writers(reader: dds_entity_t, this: *mut c_void) {
 
 /// # Safety
 ///
-/// As for [`on_writers`].
+/// Callback for readers, as [`on_writers`] is for writers.
 unsafe extern "C" fn on_readers(reader: dds_entity_t, this: *mut c_void) {
     // SAFETY: see above.
     if let Some(discovery) = unsafe { this.cast::<Discovery>().as_ref() } {

@@ -18,7 +18,7 @@ pub(super) struct Taken(lattice_sample);
 unsafe impl Send for Taken {}
 
 impl Taken {
-    /// Its bytes, encapsulation header first.
+    /// Bytes of the sample, encapsulation header first.
     pub(super) fn bytes(&self) -> &[u8] {
         // SAFETY: `self` owns a reference to the sample, which has `length` bytes.
         unsafe { slice::from_raw_parts(self.0.bytes, self.0.length) }

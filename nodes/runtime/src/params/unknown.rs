@@ -21,7 +21,7 @@ const MAX_COMPARED_BYTES: usize = 128;
 /// A parameter that is given but unknown to the node.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Unknown {
-    /// Its name.
+    /// Name of the parameter.
     pub name: String,
     /// True if it addresses this node by name; false if it addresses all nodes of the file or the arguments.
     pub named: bool,

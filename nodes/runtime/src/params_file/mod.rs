@@ -26,7 +26,7 @@ pub struct FileParam {
     pub nodes: NodePattern,
     /// Name, levels separated by dots.
     pub name: String,
-    /// Its value.
+    /// Value of the parameter.
     pub value: ParamValue,
     /// Path of keys in the file.
     pub key: String,

@@ -7,7 +7,7 @@ use crate::names::shown;
 pub(crate) struct LogLevelRule {
     /// Logger; `None`: all loggers.
     pub logger: Option<String>,
-    /// Its new level.
+    /// New level of the logger.
     pub level: LevelFilter,
 }
 

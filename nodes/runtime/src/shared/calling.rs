@@ -50,7 +50,7 @@ pub enum CallError {
     Failed {
         /// Full name of the service.
         name: String,
-        /// In words.
+        /// Reason as text.
         reason: String,
     },
 }

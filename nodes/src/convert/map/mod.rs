@@ -58,9 +58,9 @@ pub enum MapMessageError {
     /// Chunk index outside the number of chunks.
     #[error("chunk {chunk} of {chunks}")]
     Chunk {
-        /// As sent, counted from zero.
+        /// Number of the chunk in the message, from 0.
         chunk: u32,
-        /// As sent.
+        /// Number of chunks in the message.
         chunks: u32,
     },
     /// Invalid lattice frame.

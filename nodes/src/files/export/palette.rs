@@ -82,7 +82,7 @@ pub fn linear(srgb: u8) -> f64 {
     }
 }
 
-/// Height range of the colour map, without the outer hundredth on either side.
+/// Height range of the colour map: 1st to 99th percentile of the heights, metres.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HeightRange {
     low_m: f64,
@@ -90,7 +90,7 @@ pub struct HeightRange {
 }
 
 impl HeightRange {
-    /// Range of heights in metres, ignoring those that are not finite.
+    /// Range of finite heights in metres; zero if there are none.
     pub fn of(heights_m: impl IntoIterator<Item = f64>) -> HeightRange {
         let mut heights: Vec<f64> = heights_m.into_iter().filter(|h| h.is_finite()).collect();
         let low = heights.len() / 100;

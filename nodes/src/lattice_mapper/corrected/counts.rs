@@ -9,14 +9,14 @@ pub struct CorrectionCounts {
     pub clouds_no_corrections: u64,
     /// Clouds rejected: of another drive than the map.
     pub clouds_other_drive: u64,
-    /// Clouds in submaps whose place in the map is unknown now.
+    /// Clouds in submaps without a known pose in the map at present.
     pub clouds_unplaced: u64,
-    /// Clouds that were mapped and not kept, beyond `max_kept_bytes`.
+    /// Mapped clouds that were not kept because of `max_kept_bytes`.
     pub clouds_not_kept: u64,
-    /// Points beside a kept one in its cell of a quarter of the edge, which are not mapped.
+    /// Points not mapped because their cube, of a quarter of the cell size, has a point already.
     pub points_thinned: u64,
-    /// Messages of corrections that are malformed.
+    /// Malformed correction messages.
     pub corrections_refused: u64,
-    /// Maps made anew.
+    /// Maps replaced after corrections.
     pub maps_corrected: u64,
 }

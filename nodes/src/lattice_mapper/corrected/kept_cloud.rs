@@ -1,4 +1,4 @@
-//! Clouds in the frame of an odometry, thinned to be kept.
+//! Clouds in an odometry frame, thinned to be kept in memory.
 
 use std::convert::Infallible;
 
@@ -12,33 +12,33 @@ use rustc_hash::FxHashSet;
 
 use crate::convert::{cloud, geometry};
 
-/// Points of a cloud in the frame of the odometry.
+/// Points of a cloud in the odometry frame.
 pub(super) struct KeptCloud {
     pub stamp_ns: i64,
     layout: CloudLayout,
     data: Vec<u8>,
-    /// Pose of the frame of the odometry with which the map has the points; `None`: it has not.
+    /// Pose of the odometry frame at which the map has the points; `None` if it has none of them.
     pub placed: Option<Isometry3<f64>>,
 }
 
-/// A cloud as read, with the points that have no place.
+/// Thinned cloud with the numbers of its dropped points.
 pub(super) struct Thinned {
     /// Points in cells without a point so far; `None` if there are none.
     pub kept: Option<KeptCloud>,
-    /// Points in cells that have one.
+    /// Number of points in cells that already have one.
     pub thinned: u64,
-    /// NaN or infinite points, which are dropped.
+    /// Number of NaN or infinite points.
     pub not_finite: u64,
 }
 
-/// Cubic cells in the frame of the odometry that have a point.
+/// Occupied cubic cells in the odometry frame.
 pub(super) struct SeenCells {
     side_m: f64,
     cells: FxHashSet<[i32; 3]>,
 }
 
 impl SeenCells {
-    /// Without points. `side_m`: edge of the cubes.
+    /// Creates an empty set. `side_m`: edge of the cells.
     pub fn new(side_m: f64) -> Self {
         Self {
             side_m,
@@ -46,7 +46,7 @@ impl SeenCells {
         }
     }
 
-    /// Forgets all points.
+    /// Removes all cells.
     pub fn clear(&mut self) {
         self.cells.clear();
     }
@@ -93,7 +93,7 @@ impl KeptCloud {
         })
     }
 
-    /// Bytes in memory.
+    /// Size in memory, bytes.
     pub fn bytes(&self) -> usize {
         let fields = self.layout.fields.iter();
         let names: usize = fields
@@ -109,7 +109,7 @@ impl KeptCloud {
             .ok()
     }
 
-    /// The points in the map.
+    /// Message of the points in the map frame.
     pub fn message(&self, map_frame: &str, map_from_odom: &Isometry3<f64>) -> PointCloud2 {
         let header = geometry::header(map_frame, self.stamp_ns);
         let moved = self
@@ -128,7 +128,7 @@ impl KeptCloud {
         )
     }
 
-    /// Largest distance between two places of the points, m: that of the first, a middle and the last one.
+    /// Largest displacement between two poses, m: that of the first, the middle and the last point.
     pub fn moved_m(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64 {
         let Some(view) = self.view() else {
             return 0.0;
@@ -141,7 +141,7 @@ impl KeptCloud {
         moved.into_iter().fold(0.0, f64::max)
     }
 
-    /// Removes points by their places in the map; none if they are not mapped.
+    /// Keeps the points that `is_kept` selects by their position in the map; all of them if they are not mapped.
     pub fn retain(&mut self, is_kept: impl Fn(&Vector3<f64>) -> bool) {
         let (Some(placed), Some(view)) = (self.placed, self.view()) else {
             return;
@@ -158,7 +158,7 @@ impl KeptCloud {
     }
 }
 
-/// The layout of so many bytes of records in a row.
+/// Layout of `bytes` of records in one row.
 fn of_points(layout: &CloudLayout, bytes: usize) -> CloudLayout {
     let points = bytes / layout.point_step.max(1) as usize;
     let width = u32::try_from(points).unwrap_or(u32::MAX);

@@ -20,12 +20,12 @@ use self::kept_cloud::{KeptCloud, SeenCells, Thinned};
 use super::{CloudRefusal, LatticeMapper};
 use crate::convert::corrections::{CorrectionsError, PlacedCorrections};
 
-/// Side of the cubes in which one point is kept, in edges of the cube with the volume of a voxel.
+/// Edge of the cubes that keep one point each, in cell sizes.
 const KEPT_PART: f64 = 0.25;
-/// Distance that a correction has to move points by before they are mapped anew, in the same unit. A voxel is made of points up
-/// to some tenths of it from its centre.
+/// Displacement by a correction above which clouds are mapped again, in cell sizes. Points of a voxel lie within some
+/// tenths of a cell size from its centre.
 const MOVED_PART: f64 = 0.1;
-/// Time spent on a map that is made anew, after each event. A scan comes every tenth of a second.
+/// Time spent on a corrected map after each event; scans arrive every 0.1 s.
 const STEP: Duration = Duration::from_millis(30);
 
 /// Clouds of a drive and their corrections.
@@ -37,21 +37,21 @@ pub struct CorrectedDrive {
     clouds: Vec<KeptCloud>,
     bytes: usize,
     seen: SeenCells,
-    /// Voxels from a file, which corrections do not move.
+    /// Voxels of the map before the first cloud, which corrections do not move.
     base: Option<MapContents>,
     renewal: Option<Renewal>,
-    /// False after corrections that moved no cloud by much.
+    /// False once the corrections were found to move no cloud by more than the limit.
     may_be_moved: bool,
-    /// True if clouds were mapped that are not kept.
+    /// True if a mapped cloud was not kept for lack of memory.
     is_full: bool,
     counts: CorrectionCounts,
 }
 
-/// Corrections as received last.
+/// Corrections received last.
 struct Followed {
     placed: PlacedCorrections,
     odom_frame: String,
-    /// True if they are of another drive than the clouds.
+    /// True if they belong to another drive than the clouds.
     is_other_drive: bool,
 }
 
@@ -62,16 +62,16 @@ impl Followed {
     }
 }
 
-/// A map that is made anew.
+/// Corrected map under construction.
 struct Renewal {
     machine: LatticeMapper,
     corrections: PlacedCorrections,
-    /// Pose of the frame of the odometry at each cloud so far.
+    /// Pose of the odometry frame in the map at each cloud mapped so far.
     places: Vec<Option<Isometry3<f64>>>,
 }
 
 impl CorrectedDrive {
-    /// A drive without clouds, for the map of a machine. `max_bytes`: memory limit for its clouds.
+    /// Creates a drive without clouds for the map of a state machine. `max_bytes`: memory limit of the kept clouds.
     pub fn new(machine: &LatticeMapper, max_bytes: usize) -> Self {
         let side_m = machine.options.lattice.cell_volume_m3().cbrt();
         let mut drive = Self {
@@ -92,7 +92,7 @@ impl CorrectedDrive {
         drive
     }
 
-    /// Forgets all clouds, after the map was replaced. What it has now stays where it is.
+    /// Drops all clouds after the map was replaced. Voxels of the new map are not moved by corrections.
     pub fn restart(&mut self, machine: &LatticeMapper) {
         self.clouds.clear();
         self.seen.clear();
@@ -104,7 +104,7 @@ impl CorrectedDrive {
         }
     }
 
-    /// Takes corrections of all poses of the drive.
+    /// Handles the corrections of all poses of the drive.
     pub fn on_corrections(&mut self, message: &TFMessage) -> Result<(), CorrectionsError> {
         let read = PlacedCorrections::read(message, &self.map_frame);
         let (placed, odom_frame) = read.inspect_err(|_| self.counts.corrections_refused += 1)?;
@@ -137,7 +137,8 @@ impl CorrectedDrive {
         Ok(())
     }
 
-    /// Maps a cloud of the frame of the odometry, or keeps it until its place is known.
+    /// Maps a cloud given in the odometry frame, thinned, and keeps it in memory so that corrections can move it. A
+    /// cloud of a submap without a known pose in the map is kept and not mapped yet.
     pub fn on_cloud(
         &mut self,
         machine: &mut LatticeMapper,
@@ -223,7 +224,7 @@ impl CorrectedDrive {
         }
     }
 
-    /// Status in one line, where clouds are not mapped or not corrected.
+    /// Reason in one line why clouds are not mapped or not corrected; `None` if all are.
     pub fn problem(&self) -> Option<String> {
         let counts = &self.counts;
         let is_other = |followed: &Followed| followed.is_other_drive;
@@ -245,7 +246,7 @@ impl CorrectedDrive {
         &self.counts
     }
 
-    /// Removes points in a region, as the map does.
+    /// Removes the points of a region from the kept clouds, as the map does from its voxels.
     pub fn remove(&mut self, machine: &LatticeMapper, region: &Region) {
         let is_removed = |point_m: &Vector3<f64>| {
             let cells = machine.cells();
@@ -274,7 +275,7 @@ impl CorrectedDrive {
         self.counts.clouds_unplaced = unplaced.count() as u64;
     }
 
-    /// True if a cloud is to be moved by more than a distance.
+    /// True if the corrections displace a cloud by more than `least_m`.
     fn is_moved(&self, cloud: &KeptCloud, least_m: f64) -> bool {
         match (cloud.placed, self.place(cloud.stamp_ns)) {
             (Some(from), Some(to)) => from != to && cloud.moved_m(&from, &to) > least_m,
@@ -282,8 +283,8 @@ impl CorrectedDrive {
         }
     }
 
-    /// Spends some time on a map with the newest corrections, if they move the clouds. True if the map of the machine was
-    /// replaced: `epoch` is the new one.
+    /// Spends up to 30 ms on a map with the newest corrections, if they move the clouds. Returns true if the map of
+    /// the state machine was replaced; it then has a new epoch.
     pub fn step(
         &mut self,
         machine: &mut LatticeMapper,
@@ -292,7 +293,7 @@ impl CorrectedDrive {
         self.work(machine, epoch, Instant::now().checked_add(STEP))
     }
 
-    /// Makes the map with the newest corrections, however little they move.
+    /// Completes the map with the newest corrections, however little they move.
     pub fn finish(
         &mut self,
         machine: &mut LatticeMapper,
@@ -305,7 +306,7 @@ impl CorrectedDrive {
         Ok(is_replaced)
     }
 
-    /// Works until a time, or to the end.
+    /// Works until a time, or to the end without one.
     fn work(
         &mut self,
         machine: &mut LatticeMapper,
@@ -353,7 +354,7 @@ impl CorrectedDrive {
         Ok(true)
     }
 
-    /// Begins a map with the newest corrections, if they move a cloud by more than a distance.
+    /// Begins a map with the newest corrections, if they displace a cloud by more than `least_m`.
     fn begin(&mut self, machine: &LatticeMapper, least_m: f64) -> Result<bool, FreeSpaceError> {
         let Some(followed) = &self.corrections else {
             return Ok(false);

@@ -90,11 +90,15 @@ fn content<'a>(
 ) -> Result<Cow<'a, [u8]>, String> {
     let length = buffer.byte_length;
     if before.saturating_add(length) > MAX_BYTES {
-        return Err(format!("{length} bytes, so all buffers exceed {MAX_BYTES}"));
+        return Err(format!(
+            "`byteLength` is {length}: all buffers together exceed {MAX_BYTES} bytes"
+        ));
     }
     let mut bytes: Cow<'a, [u8]> = match buffer.uri.as_deref() {
-        None if number == 0 => binary.ok_or("it has no uri, and the file no bytes")?.into(),
-        None => return Err("it has no uri".to_owned()),
+        None if number == 0 => binary
+            .ok_or("it has no `uri`, and the file has no binary chunk (GLB)")?
+            .into(),
+        None => return Err("it has no `uri`; only buffer 0 may be the binary chunk".to_owned()),
         Some(uri) => match uri.strip_prefix("data:") {
             Some(data) => embedded(data)?.into(),
             None => beside(uri, folder, length)?.into(),
@@ -104,7 +108,7 @@ fn content<'a>(
     let found = bytes.len();
     let Some(wanted) = wanted.filter(|wanted| *wanted <= found) else {
         return Err(format!(
-            "{length} bytes are stated, but {found} are present"
+            "`byteLength` is {length}, but only {found} bytes are present"
         ));
     };
     match &mut bytes {
@@ -126,10 +130,11 @@ fn embedded(data: &str) -> Result<Vec<u8>, String> {
 
 /// First bytes of a file in the folder or below it.
 fn beside(uri: &str, folder: Option<&Path>, length: u64) -> Result<Vec<u8>, String> {
-    let folder = folder.ok_or("separate buffer files are not supported here")?;
+    let folder =
+        folder.ok_or("separate buffer files are not supported here; use GLB or data URIs")?;
     let path = inside(uri).ok_or_else(|| {
         let uri: String = uri.chars().take(80).collect();
-        format!("'{uri}' leads out of the folder of the file")
+        format!("'{uri}' leads out of the folder of the file: put its buffers there or below")
     })?;
     let failed = |error: std::io::Error| format!("{}: {error}", path.display());
     // A link may lead outside, too.
@@ -137,7 +142,7 @@ fn beside(uri: &str, folder: Option<&Path>, length: u64) -> Result<Vec<u8>, Stri
     let full = folder.join(&path).canonicalize().map_err(failed)?;
     if !full.starts_with(&folder) {
         return Err(format!(
-            "{} leads out of the folder of the file",
+            "{} leads out of the folder of the file: put its buffers there or below",
             path.display()
         ));
     }

@@ -4,9 +4,9 @@
 pub struct File {
     /// URL path.
     pub path: &'static str,
-    /// Its media type.
+    /// Media type of the file.
     pub media_type: &'static str,
-    /// Its bytes.
+    /// Content of the file.
     pub bytes: &'static [u8],
 }
 

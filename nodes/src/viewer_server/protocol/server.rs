@@ -90,11 +90,11 @@ type Linked<'a> = Vec<(&'a str, Vec<&'a str>)>;
 
 /// Changes of the node graph.
 pub struct GraphUpdate<'a> {
-    /// Topics with changed publishers, with all of them.
+    /// Topics with changed publishers, each with all its publishers.
     pub published: Linked<'a>,
-    /// Topics with changed subscribers.
+    /// Topics with changed subscribers, each with all its subscribers.
     pub subscribed: Linked<'a>,
-    /// Services with changed servers.
+    /// Services with changed servers, each with all its servers.
     pub services: Linked<'a>,
     /// Removed topics.
     pub removed_topics: Vec<&'a String>,

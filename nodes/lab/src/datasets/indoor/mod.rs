@@ -70,7 +70,7 @@ pub struct IndoorOptions {
 pub struct Indoor {
     /// Numbers of what was written.
     pub summary: IndoorSummary,
-    /// The pose that a calibration looks for.
+    /// True pose of the headset in the map.
     pub map_from_headset: Isometry3<f64>,
     /// Voxels that the robot saw at the poses that it measured, with the true labels.
     pub truth: VoxelList,

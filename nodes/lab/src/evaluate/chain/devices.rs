@@ -31,10 +31,10 @@ const CAMERA: &str = "camera";
 const HEADSET: &str = "headset_origin";
 /// Time between images, ns.
 const PERIOD_NS: i64 = 1_000_000_000;
-/// Every so many columns and rows of a depth image become points.
+/// Step of the columns and rows of a depth image that become points.
 const STRIDE: usize = 2;
 
-/// One thing with the labels of the network, and the same with true labels.
+/// Result with the labels of the network, and the same with true labels.
 pub(super) struct Both<T> {
     pub found: T,
     pub truth: T,
@@ -226,7 +226,11 @@ fn labelled(
 /// Share of points whose most probable label is the true one, of those that truly have one.
 pub(super) fn right_share(found: &SemanticCloud, truth: &SemanticCloud) -> Result<f64, AnyError> {
     if found.points_m != truth.points_m {
-        return Err("points with labels of the network are not those with true labels".into());
+        let (found, truth) = (found.points_m.len(), truth.points_m.len());
+        let problem = format!(
+            "{found} points with labels of the network, expected the same {truth} as with true labels"
+        );
+        return Err(problem.into());
     }
     let pairs = found.labels.iter().zip(&truth.labels);
     let known = pairs.filter(|(_, truth)| truth.top().is_some());

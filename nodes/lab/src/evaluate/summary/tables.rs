@@ -1,4 +1,4 @@
-//! The rows of the tables.
+//! Rows of the tables.
 
 use crate::evaluate::statistics::Share;
 #[cfg(doc)]
@@ -6,13 +6,13 @@ use crate::evaluate::trial::WRONG;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Printed errors of a scene (Nakamura et al. 2019, table 1).
+/// Published errors of a scene (Nakamura et al. 2019, table 1).
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Printed {
     pub scene: &'static str,
-    /// Printed d_SE3 of GICP-SE(3).
+    /// Published d_SE3 of GICP-SE(3).
     pub gicp_se3: f64,
-    /// d_SE3 of Semantic-ICP.
+    /// Published d_SE3 of Semantic-ICP.
     pub semantic_icp: f64,
 }
 
@@ -32,14 +32,14 @@ const fn printed(scene: &'static str, gicp_se3: f64, semantic_icp: f64) -> Print
     }
 }
 
-/// One method on one scene with one share of wrong labels from one start.
+/// Results of one method for one scene, fraction of wrong labels and start.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Row {
     pub scene: String,
     pub start: String,
     pub q: f64,
     pub method: String,
-    /// Poses within [`WRONG`].
+    /// Fraction of poses within [`WRONG`].
     pub success: Share,
     pub d_se3: Option<f64>,
     pub d_se3_left: Option<f64>,
@@ -49,21 +49,21 @@ pub struct Row {
     pub view_m: Option<f64>,
 }
 
-/// Ours against another from the same starts.
+/// Comparison of Lattice with another method from the same starts.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Paired {
     pub against: String,
     pub start: String,
     pub q: Option<f64>,
-    /// Share of trials with distance and angle both within 1 cm and 0.2 degrees of the other's, or smaller.
+    /// Fraction of trials with errors at most 1 cm and 0.2 degrees above those of the other method.
     pub not_worse: Share,
-    /// Share of the same, or ours is right where the other is wrong.
+    /// Fraction of these trials, and of those in which only Lattice is right.
     pub not_worse_or_saved: Share,
-    /// Share by the mean distance of the seen points alone, within 1 cm.
+    /// Fraction of trials with a mean distance of the seen points at most 1 cm above that of the other method.
     pub not_worse_in_view: Share,
-    /// Share in which ours is right and the other wrong.
+    /// Fraction of trials in which only Lattice is right.
     pub saved: Share,
-    /// Share in which ours is wrong and the other right.
+    /// Fraction of trials in which only the other method is right.
     pub spoiled: Share,
 }
 

@@ -1,4 +1,4 @@
-//! Point clouds that are quantized: evenly spread, of simulated scanners, of files.
+//! Point clouds for the evaluation of quantization: uniform, simulated, or from files.
 
 use super::Options;
 use crate::paper::streams::{Purpose, stream};
@@ -8,37 +8,37 @@ use crate::{AnyError, at};
 use lattice_nodes::files::points::{PointFileOptions, read_points};
 use std::path::Path;
 
-/// Points of a simulated scan.
+/// Number of points of a simulated scan.
 const POINTS: usize = 20_000;
-/// Most points that are taken of a file.
+/// Maximum number of points of a file; the rest is dropped at random.
 const FILE_POINTS: usize = 60_000;
-/// Side of the cube that evenly spread points fill, metres.
+/// Edge of the cube of uniformly distributed points, metres.
 const CUBE_M: f64 = 20.0;
 
 /// Source of points.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Source {
-    /// Evenly spread in a cube.
+    /// Uniformly distributed in a cube.
     Uniform,
-    /// A simulated scan.
+    /// Scan of a simulated scanner.
     Simulated,
-    /// A file.
+    /// Point file.
     File,
 }
 
-/// One cloud, about its scanner or its middle, z up, metres.
+/// Point cloud with the scanner or the centroid at the origin, z up, metres.
 pub struct Scan {
-    /// Stem of names.
+    /// Stem of file names.
     pub id: String,
-    /// Description.
+    /// Title in the report.
     pub title: String,
     /// Source of its points.
     pub source: Source,
-    /// True if the ground is most of it.
+    /// True if most points are on the ground.
     pub outdoors: bool,
-    /// The points.
+    /// Points, metres.
     pub points: Vec<[f32; 3]>,
-    /// Volumes of the cells that it is quantized to, the first of which is drawn, m^3.
+    /// Cell volumes for the quantization, m^3; figures show the first.
     pub volumes_m3: Vec<f64>,
 }
 
@@ -125,7 +125,7 @@ fn file(path: &Path, number: usize, options: &Options) -> Result<Scan, AnyError>
     })
 }
 
-/// Some of the points, at most so many, drawn at random, in their order.
+/// Random subset of at most `most` points, in their order.
 fn thinned(points: Vec<[f32; 3]>, most: usize, seed: u64, number: usize) -> Vec<[f32; 3]> {
     let mut stream = stream(seed, Purpose::Thin, number);
     let (mut left, mut wanted) = (points.len() as f64, most as f64);

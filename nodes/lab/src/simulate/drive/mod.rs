@@ -14,13 +14,13 @@ use super::town::solid::Solid;
 use crate::random::Stream;
 use route::Route;
 
-/// One turn, ns.
+/// Duration of a turn, ns.
 const TURN_NS: i64 = 100_000_000;
-/// Sectors by which solids are looked up.
+/// Number of sectors by which solids are indexed.
 const SECTORS: usize = 128;
-/// Farthest that the lidar or a car moves in half a turn, metres.
+/// Bound of the motion of the lidar or a car in half a turn, metres.
 const MOVED_M: f64 = 1.0;
-/// Number of the first stream of a scan: above those of scenes.
+/// Number of the first random stream of a scan, above those of scenes.
 const SCAN_STREAM: u64 = 1 << 16;
 
 /// Scene of a drive.
@@ -34,9 +34,9 @@ pub enum DriveScene {
     Corridor,
     /// A street, a tunnel without features, and a street.
     Tunnel,
-    /// A plane without anything on it.
+    /// An empty plane.
     Yard,
-    /// The indoor circuit, with a sensor that sees nothing for a while.
+    /// The indoor circuit, with scans without returns for a while.
     Blank,
     /// The indoor circuit, without scans for two seconds.
     Gap,
@@ -76,7 +76,7 @@ impl DriveScene {
     }
 }
 
-/// A lidar that turns about the vertical ten times a second.
+/// Lidar that rotates about the vertical ten times a second.
 #[derive(Clone, Copy, Debug)]
 struct SpinningLidar {
     beams: usize,
@@ -118,7 +118,7 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// The drive of a scene and a seed.
+    /// Creates the drive of a scene and a seed.
     pub fn new(scene: DriveScene, seed: u64) -> Drive {
         scenes::drive(scene, seed)
     }
@@ -134,7 +134,7 @@ impl Drive {
         self.route.pose(time_ns as f64 * 1e-9, self.lidar.height_m)
     }
 
-    /// The scan of a number.
+    /// Simulates the scan of a number.
     pub fn scan(&self, number: i64) -> DriveScan {
         let end_ns = number * TURN_NS;
         let middle_ns = end_ns - TURN_NS / 2;

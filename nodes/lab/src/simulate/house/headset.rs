@@ -72,7 +72,7 @@ pub struct HeadsetTrial {
     pub instance: u16,
     /// One or several, all in the same frame.
     pub headset_scans: Vec<HouseScan>,
-    /// The truth that a calibration looks for.
+    /// True pose of the headset in the map.
     pub map_from_headset: Isometry3<f64>,
     /// Side of a voxel of the headset's mesh, metres.
     pub voxel_m: f64,

@@ -1,4 +1,4 @@
-//! Rooms that look alike from several places: adversarial scenes of a registration without a guess.
+//! Rooms that look alike from several places: adversarial scenes of a registration without an initial guess.
 
 use lattice_core::registration::{LabelDistribution, SemanticCloud, SourceCloud};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -9,14 +9,14 @@ const HEIGHT_M: f64 = 2.7;
 const EYE_M: f64 = 1.6;
 
 impl Flat {
-    /// An empty room of `x_m` by `y_m` about the origin, with floor and ceiling.
+    /// Creates an empty room of `x_m` by `y_m` about the origin, with floor and ceiling.
     pub fn room(x_m: f64, y_m: f64) -> Flat {
         let mut room = Flat::empty();
         room.add_room([0.0, 0.0], x_m, y_m);
         room
     }
 
-    /// Equal square rooms in a row along x, without doors.
+    /// Creates `n` equal square rooms in a row along x, without doors.
     pub fn row_of_rooms(n: usize, side_m: f64) -> Flat {
         let mut row = Flat::empty();
         for i in 0..n {
@@ -25,7 +25,7 @@ impl Flat {
         row
     }
 
-    /// A round room of flat panels.
+    /// Creates a round room of flat panels.
     pub fn silo(radius_m: f64, panels: usize) -> Flat {
         let mut silo = Flat::empty();
         let corner = |i: usize| {
@@ -44,7 +44,7 @@ impl Flat {
         silo
     }
 
-    /// Stairs that rise along x between two walls, `n` steps about the origin.
+    /// Creates stairs of `n` steps about the origin that rise along x between two walls.
     pub fn stairs(n: usize) -> Flat {
         const RUN: f64 = 0.3;
         const RISE: f64 = 0.17;
@@ -63,7 +63,7 @@ impl Flat {
         stairs
     }
 
-    /// The same with a box of `size_m` that stands with a corner at `corner_m`.
+    /// Adds a box of the given size to the floor, with a corner at the given x and y, metres.
     #[must_use]
     pub fn with_box(mut self, [x, y]: [f64; 2], [a, b, c]: [f64; 3]) -> Flat {
         self.add_box([x, y, 0.0], [a, b, c], 5);
@@ -85,8 +85,8 @@ impl Flat {
         }
     }
 
-    /// The room as a map of cells of 5 cm has it, each centroid off by a few millimetres; `uniform` gives
-    /// numbers in [0, 1).
+    /// Map of the room in cells of 5 cm, with errors of a few millimetres of the centroids; `uniform` returns numbers
+    /// in [0, 1).
     pub fn noisy_map(&self, uniform: &mut impl FnMut() -> f64) -> SemanticCloud {
         let mut map = self.map();
         let points = map.points_m.iter_mut();
@@ -94,7 +94,7 @@ impl Flat {
         map
     }
 
-    /// Scan all around from `x_m`, `y_m`, 1.6 m above the floor, with labels.
+    /// Labelled scan of all directions from `x_m`, `y_m`, 1.6 m above the floor.
     pub fn all_around(
         &self,
         [x_m, y_m]: [f64; 2],
@@ -122,7 +122,7 @@ impl Flat {
     }
 }
 
-/// A point of a cube about 0.
+/// Random point of a cube about 0.
 fn off(half_side_m: f64, uniform: &mut impl FnMut() -> f64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| (2.0 * uniform() - 1.0) * half_side_m)
 }

@@ -5,7 +5,7 @@ mod alike;
 use lattice_core::registration::{LabelDistribution, SemanticCloud};
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// A rectangle with a class: corner, sides, label.
+/// Labelled rectangle: corner, sides, label.
 type Patch = (Vector3<f64>, Vector3<f64>, Vector3<f64>, u16);
 
 const WALL: u16 = 1;
@@ -23,7 +23,7 @@ const FURNITURE: [([f64; 3], [f64; 3], u16); 8] = [
     ([6.1, 4.2, 0.0], [1.6, 1.5, 0.5], 8),
 ];
 
-/// Places in the flat to look from, and headings; from the last only a bare wall is seen.
+/// Positions and headings of views in the flat; the last view sees only a bare wall.
 pub const LOOKS: [([f64; 3], f64); 6] = [
     ([3.5, 3.8, 1.6], -2.2),
     ([1.0, 3.9, 1.6], -0.6),
@@ -33,7 +33,7 @@ pub const LOOKS: [([f64; 3], f64); 6] = [
     ([3.5, 3.0, 1.6], 1.6),
 ];
 
-/// Two rooms of 9 m x 6 m with a door between.
+/// Flat of two rooms of 9 m x 6 m with a door between.
 #[derive(Clone, Debug)]
 pub struct Flat(Vec<Patch>);
 
@@ -60,12 +60,12 @@ impl Default for Flat {
 }
 
 impl Flat {
-    /// Nothing yet.
+    /// Creates a flat without surfaces.
     fn empty() -> Flat {
         Flat(Vec::new())
     }
 
-    /// The top and the four sides of a box.
+    /// Adds the top and the four sides of a box.
     fn add_box(&mut self, [x, y, z]: [f64; 3], [a, b, c]: [f64; 3], label: u16) {
         self.add([x, y, z + c], [a, 0., 0.], [0., b, 0.], label);
         self.add([x, y, z], [a, 0., 0.], [0., 0., c], label);
@@ -94,7 +94,7 @@ impl Flat {
         points
     }
 
-    /// The flat as a map of cells of 5 cm has it.
+    /// Map of the flat in cells of 5 cm.
     pub fn map(&self) -> SemanticCloud {
         let (points_m, labels) = (self.points(0.05).into_iter())
             .map(|(p, label)| (Point3::from(p), LabelDistribution::hard(label)))

@@ -59,7 +59,7 @@ pub struct Lidar {
 }
 
 impl Lidar {
-    /// As an HDL-64E, with half of its shots.
+    /// Scanner like an HDL-64E, with half of its shots.
     pub const HDL64: Lidar = Lidar {
         beams: 64,
         elevations_rad: [-0.433, 0.035],
@@ -67,7 +67,7 @@ impl Lidar {
         range_m: 80.0,
         noise_m: 0.02,
     };
-    /// As a VLP-16.
+    /// Scanner like a VLP-16.
     pub const VLP16: Lidar = Lidar {
         beams: 16,
         elevations_rad: [-0.262, 0.262],

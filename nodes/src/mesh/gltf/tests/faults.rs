@@ -118,14 +118,14 @@ pub(super) fn faults() -> Vec<(&'static str, Value, &'static str)> {
         (
             "/buffers/0/byteLength",
             json!(61),
-            "61 bytes are stated, but 60",
+            "`byteLength` is 61, but only 60",
         ),
         (
             "/buffers/0/byteLength",
             json!(u64::MAX),
-            "so all buffers exceed",
+            "all buffers together exceed",
         ),
-        ("/buffers/0/uri", json!(null), "no uri"),
+        ("/buffers/0/uri", json!(null), "no `uri`"),
         (
             "/buffers/0/uri",
             json!("data:;base64,####"),

@@ -12,7 +12,7 @@ pub(super) fn rho(x: f64, alpha: f64) -> f64 {
     alpha * alpha * (x / (alpha * alpha)).ln_1p()
 }
 
-/// Its derivative.
+/// Derivative of the kernel.
 pub(super) fn rho_slope(x: f64, alpha: f64) -> f64 {
     1.0 / (1.0 + x / (alpha * alpha))
 }

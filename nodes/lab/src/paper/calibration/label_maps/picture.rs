@@ -17,14 +17,14 @@ const CONTRAST: f64 = 0.6;
 const LEVELS: u32 = 15;
 /// Height of the camera over the horizon, degrees.
 const ELEVATION_DEG: f64 = 24.0;
-/// Side of the cubes that headset points are drawn as, metres: a little over their distances.
+/// Edge of the cubes that show headset points, metres: slightly above their spacing.
 const POINT_M: f64 = 0.035;
-/// Distance up to which a voxel counts as the same place, in sides of voxels.
+/// Distance within which a voxel counts as the same position, in cell sizes.
 const REACH_CELLS: f64 = 2.0;
-/// More of the map is shown on each side than the headset saw, metres.
+/// Margin of the map around the view of the headset, metres.
 const MARGIN_M: f64 = 0.3;
 
-/// Points with a class each, map frame, metres.
+/// Points with one class each, map frame, metres.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Labelled {
     pub points_m: Vec<Point3<f64>>,
@@ -40,14 +40,14 @@ impl Labelled {
 
 /// Labelled voxels of both devices in the headset's view.
 pub(super) struct Sides {
-    /// The robot's voxels about it.
+    /// Voxels of the robot in the view.
     pub robot: Labelled,
-    /// The headset's points at its true pose.
+    /// Points of the headset at its true pose.
     pub headset: Labelled,
-    /// The class of the robot's nearest voxel at each point of the headset, or the point's own if a voxel
-    /// near it has that: labels bleed over the borders of objects.
+    /// Class of the robot's nearest voxel at each headset point, or the class of the point itself if a nearby voxel
+    /// has it, since labels are blurred at the borders of objects.
     pub partners: Vec<u16>,
-    /// Side of the robot's voxels, metres.
+    /// Cell size of the robot's voxels, metres.
     cell_m: f64,
     view: Bounds,
 }
@@ -61,7 +61,7 @@ struct Bounds {
 }
 
 impl Bounds {
-    /// About points, with the horizontal direction of sight.
+    /// Box around points, with the horizontal viewing direction.
     fn about(forward: Vector3<f64>, points_m: &[Point3<f64>]) -> Bounds {
         let left = Vector3::z().cross(&forward);
         let axes = [forward, left, Vector3::z()];
@@ -82,7 +82,7 @@ impl Bounds {
         })
     }
 
-    /// The middle, and how wide a picture must be to show all of it.
+    /// Centre and width of a picture that shows the whole box.
     fn focus(&self) -> Focus {
         let mut center = Vector3::zeros();
         let mut size_m = [0.0; 3];
@@ -103,7 +103,7 @@ impl Bounds {
 }
 
 impl Sides {
-    /// Both sides of a scenario, whose map has cells with this side.
+    /// Labelled voxels of a scenario whose map has this cell size.
     pub(super) fn new(scenario: &Scenario, cell_m: f64) -> Sides {
         let truth = &scenario.truth;
         let mut headset = Labelled::default();
@@ -149,18 +149,18 @@ impl Sides {
         }
     }
 
-    /// The robot's voxels as a PNG.
+    /// Robot's voxels as a PNG.
     pub(super) fn robot_png(&self, colors: &LabelColors) -> Result<Vec<u8>, AnyError> {
         self.png(&self.robot, self.cell_m, colors)
     }
 
-    /// The headset's points as a PNG.
+    /// Headset's points as a PNG.
     pub(super) fn headset_png(&self, colors: &LabelColors) -> Result<Vec<u8>, AnyError> {
         self.png(&self.headset, POINT_M, colors)
     }
 
-    /// The headset's points by whether the robot's voxel there has the same class (0), another (1) or there
-    /// is none (2), as a PNG.
+    /// Headset's points as a PNG, coloured by the robot's voxel there: same class (0), another class (1), no voxel
+    /// (2).
     pub(super) fn agreement_png(&self, colors: &LabelColors) -> Result<Vec<u8>, AnyError> {
         let pairs = self.headset.classes.iter().zip(&self.partners);
         let kind = |(mine, other): (&u16, &u16)| match *other {
@@ -202,7 +202,7 @@ impl Sides {
     }
 }
 
-/// A picture with fewer colours, as indices of a palette where 256 do.
+/// Picture with fewer colours, as palette indices if 256 colours are enough.
 fn smaller(png: &[u8]) -> Result<Vec<u8>, AnyError> {
     let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info()?;
     let mut pixels = vec![0; reader.output_buffer_size().unwrap_or_default()];

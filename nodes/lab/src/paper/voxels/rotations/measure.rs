@@ -48,7 +48,7 @@ impl Turns {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Laid {
     pub kind: LatticeKind,
-    /// Its axes in the map.
+    /// Axes of the lattice in the map.
     pub orientation: Orientation,
 }
 

@@ -9,10 +9,10 @@ use crate::simulate::random::{Purpose, Stream};
 use plan::Plan;
 
 impl House {
-    /// A house of four or six furnished rooms in two rows, all of it drawn by a seed: walls, doors, windows, what
-    /// is in the rooms, where, and how large. Some have no ceiling, as scans often have none.
+    /// Generates a house of four or six furnished rooms in two rows from a seed: walls, doors, windows, furniture,
+    /// positions and sizes. Some rooms have no ceiling, as in many scans.
     ///
-    /// No seed gives the rooms of [`House::generated`], which makes it fit for training what is tested there.
+    /// No seed gives the rooms of [`House::generated`], so networks trained on such houses can be tested there.
     pub fn drawn(seed: u64) -> Result<House, AnyError> {
         let mut stream = Stream::new(seed, Purpose::DrawnHouse, 0, 0);
         let mut builder = Builder::default();
