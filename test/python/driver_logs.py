@@ -1,6 +1,6 @@
 """Logs as drivers and estimators record them, all of the drive of driver_scene.
 
-driver_logs.py FOLDER NAME:mcap|sqlite3...
+driver_logs.py FOLDER NAME:mcap|sqlite3|ros1[_bz2|_lz4][_split][_active]...
 
 Writes the log of each name to FOLDER/NAME and prints, as JSON, the cells that each must give: under "maps"
 rows of three indices and a count, under "logs" the number of its map for each name.

@@ -1,4 +1,4 @@
-"""Messages of lidars and estimators on the drive, written as a rosbag2 log by rosbags."""
+"""Messages of lidars and estimators on the drive, written as a rosbag2 log or a ROS 1 bag by rosbags."""
 
 import numpy
 from rosbags.interfaces import (
@@ -21,6 +21,7 @@ from driver_messages import (
     serialized,
     transform_message,
 )
+from driver_ros1 import write_ros1
 from driver_scene import DRIVE_S, IDENTITY, SECOND_NS, START_NS, drive, map_of, pose
 
 # What a driver needs to hand a message on.
@@ -71,6 +72,11 @@ class Recording:
         self.messages.append((at_ns, topic, data))
 
     def write(self, folder, storage):
+        """Storage: mcap, sqlite3, or ros1 with a compression and other marks."""
+        self.messages.sort(key=lambda message: message[0])
+        if storage.startswith("ros1"):
+            write_ros1(folder, storage.split("_")[1:], self.topics, self.messages)
+            return
         with Writer(folder, version=9, storage_plugin=StoragePlugin[storage.upper()]) as writer:
             connections = {
                 topic: writer.add_connection(
@@ -78,7 +84,7 @@ class Recording:
                 )
                 for topic, (kind, offered) in self.topics.items()
             }
-            for at_ns, topic, data in sorted(self.messages, key=lambda message: message[0]):
+            for at_ns, topic, data in self.messages:
                 writer.write(connections[topic], at_ns, data)
 
     def times(self, rate_hz, span_s=DRIVE_S):

@@ -1,4 +1,4 @@
-//! Reading, writing and playing of rosbag2 bags.
+//! Reading, writing and playing of rosbag2 bags; reading of ROS 1 bags.
 //!
 //! | to | begin with |
 //! |---|---|
@@ -6,7 +6,9 @@
 //! | write a bag | [`BagWriter::create`] |
 //! | play a bag at its times | [`Player`], a state machine without a clock |
 //! | copy what a damaged bag still has | [`recover`] |
+//! | write a bag of ROS 1 as one of ROS 2 | [`convert`] |
 //!
+//! Messages of ROS 1 (`.bag`, and MCAP of profile `ros1`) are converted to those of ROS 2 by the definitions in the file.
 //! Messages are CDR bytes with their encapsulation header. `examples/1_write_and_read_a_bag.rs` does both.
 #![forbid(unsafe_code)]
 
@@ -15,6 +17,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod convert;
 mod error;
 mod mcap_storage;
 mod messages;
@@ -23,6 +26,7 @@ mod player;
 mod qos;
 mod reader;
 mod recover;
+mod ros1;
 mod sniff;
 mod split;
 mod split_list;
@@ -35,6 +39,7 @@ mod writer;
 mod yaml;
 mod zstd_files;
 
+pub use convert::{Converted, convert};
 pub use error::BagError;
 pub use messages::Messages;
 pub use player::{PlayedTopic, Player, PlayerOptions, Step};

@@ -1,4 +1,4 @@
-//! Reader of rosbag2 directories and bare storage files.
+//! Reader of rosbag2 directories, bare storage files and ROS 1 bags.
 
 use std::{
     fs,
@@ -11,7 +11,7 @@ use super::{
     messages::MessageCompression,
     metadata::{CompressionMode, Metadata},
     recover::is_sqlite,
-    split::Split,
+    split::{OpenFile, Split},
     split_list::{in_order_of_time, listed_splits, splits_in},
     storage::{Filter, TopicIndex, full_type_name, merge_topic},
     topic::absolute_name,
@@ -57,7 +57,7 @@ pub struct BagReader {
 }
 
 impl BagReader {
-    /// Opens a rosbag2 directory, with or without `metadata.yaml`, or a bare storage file.
+    /// Opens a rosbag2 directory, with or without `metadata.yaml`, a bare storage file, a ROS 1 bag or a directory of such.
     ///
     /// A damaged bag opens with a warning if any part of it is readable.
     pub fn open(path: &Path) -> Result<BagReader, BagError> {
@@ -108,11 +108,27 @@ impl BagReader {
         self.splits.iter().map(|split| split.path.as_path())
     }
 
-    /// Storage format of the files.
+    /// Storage format of the files; that to convert ROS 1 bags to is MCAP.
     pub fn storage(&self) -> Storage {
         match self.is_sqlite() {
             true => Storage::Sqlite3,
             false => Storage::Mcap,
+        }
+    }
+
+    /// True if the messages were recorded by ROS 1 and are converted.
+    pub fn is_ros1(&self) -> bool {
+        let open = self.splits.iter().filter_map(|split| split.open.as_ref());
+        open.into_iter().any(OpenFile::is_ros1)
+    }
+
+    /// Name of the storage format: `mcap`, `sqlite3` or `rosbag1`.
+    pub fn storage_name(&self) -> &'static str {
+        let is_bag = |open: &OpenFile| matches!(open, OpenFile::Ros1(_));
+        let open = self.splits.iter().filter_map(|split| split.open.as_ref());
+        match open.into_iter().any(is_bag) {
+            true => "rosbag1",
+            false => self.storage().identifier(),
         }
     }
 

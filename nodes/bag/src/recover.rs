@@ -169,7 +169,7 @@ fn readers(bag: &Path, recovered: &mut Recovered) -> Result<Vec<BagReader>, BagE
 }
 
 /// Index of the topic in the new bag, added if needed.
-fn add(
+pub(crate) fn add(
     writer: &mut BagWriter,
     known: &mut HashMap<(String, String), usize>,
     topic: &TopicInfo,
@@ -198,7 +198,7 @@ pub(crate) fn is_sqlite(path: &Path) -> bool {
     let named = path.to_string_lossy().contains(".db3");
     identify(path).map_or(named, |kind| match kind {
         FileKind::Sqlite3 => true,
-        FileKind::Mcap => false,
+        FileKind::Mcap | FileKind::Ros1 => false,
         FileKind::Zstd => named,
     })
 }

@@ -2,7 +2,7 @@
 
 use std::{fs::File, io::Read, path::Path};
 
-use super::BagError;
+use super::{BagError, ros1::ROS1_MAGIC};
 
 /// Magic at both ends of an MCAP file.
 pub(crate) const MCAP_MAGIC: &[u8] = mcap::MAGIC;
@@ -16,17 +16,16 @@ pub(crate) const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
 pub(crate) enum FileKind {
     Mcap,
     Sqlite3,
+    Ros1,
     Zstd,
 }
 
-const NO_BAG: &str = "give a rosbag2 folder, or an .mcap or .db3 file of one";
-const ROS_1: &str = "convert it with `rosbags-convert --src FILE --dst FOLDER`";
+const NO_BAG: &str = "give a rosbag2 folder, an .mcap or .db3 file of one, or a .bag file of ROS 1";
 const CAPTURE: &str = "replay it through the sensor's ROS 2 driver and record that";
 const METADATA: &str = "give the folder that holds it";
 
 /// File types that are mistaken for a bag: first bytes, name, remedy.
 const FOREIGN: &[(&[u8], &str, &str)] = &[
-    (b"#ROSBAG V", "a ROS 1 bag", ROS_1),
     (b"\x89PNG", "a PNG image", NO_BAG),
     (b"\xff\xd8\xff", "a JPEG image", NO_BAG),
     (b"%PDF", "a PDF document", NO_BAG),
@@ -62,9 +61,10 @@ pub(crate) fn identify(path: &Path) -> Result<FileKind, BagError> {
         .read_to_end(&mut head)
         .map_err(BagError::io(path, "read"))?;
     let name = path.to_string_lossy();
-    let named = match (name.ends_with(".mcap"), name.ends_with(".db3")) {
-        (true, _) => Some(FileKind::Mcap),
-        (_, true) => Some(FileKind::Sqlite3),
+    let named = match &*name {
+        name if name.ends_with(".mcap") => Some(FileKind::Mcap),
+        name if name.ends_with(".db3") => Some(FileKind::Sqlite3),
+        name if is_ros1(name) => Some(FileKind::Ros1),
         _ => None,
     };
     if let Some(kind) = named.filter(|_| is_unknown(&head)) {
@@ -85,9 +85,14 @@ pub(crate) fn identify(path: &Path) -> Result<FileKind, BagError> {
     })
 }
 
+/// True for the name of a ROS 1 bag, finished or not.
+pub(crate) fn is_ros1(name: &str) -> bool {
+    name.ends_with(".bag") || name.ends_with(".bag.active")
+}
+
 /// True for bytes that start neither a known file type nor a text.
 fn is_unknown(head: &[u8]) -> bool {
-    let kinds = [MCAP_MAGIC, SQLITE_MAGIC, ZSTD_MAGIC].into_iter();
+    let kinds = [MCAP_MAGIC, SQLITE_MAGIC, ROS1_MAGIC, ZSTD_MAGIC].into_iter();
     let is_kind = |magic: &[u8]| head.starts_with(magic) || magic.starts_with(head);
     !kinds.chain(FOREIGN.iter().map(|f| f.0)).any(is_kind)
         && !head
@@ -99,6 +104,7 @@ fn identify_bytes(head: &[u8]) -> Result<FileKind, (String, &'static str)> {
     let kinds = [
         (MCAP_MAGIC, FileKind::Mcap),
         (SQLITE_MAGIC, FileKind::Sqlite3),
+        (ROS1_MAGIC, FileKind::Ros1),
         (ZSTD_MAGIC, FileKind::Zstd),
     ];
     if let Some((_, kind)) = kinds.iter().find(|(magic, _)| head.starts_with(magic)) {
@@ -134,8 +140,7 @@ mod tests {
     #[test]
     fn foreign_files_are_named() {
         for (bytes, expected) in [
-            (&b"#ROSBAG V2.0\n"[..], "a ROS 1 bag"),
-            (b"\x89PNG\r\n\x1a\n", "a PNG image"),
+            (&b"\x89PNG\r\n\x1a\n"[..], "a PNG image"),
             (b"", "empty"),
             (b"hello world\n", "a text file"),
             (b"\0\0\0\0\0", "zeros"),

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{
     BagError, TopicInfo,
     mcap_storage::McapFile,
+    ros1::Ros1File,
     sniff::{FileKind, identify},
     sqlite_storage::SqliteFile,
     storage::{Filter, StorageInfo, StorageStream, TopicIndex},
@@ -15,6 +16,7 @@ use super::{
 pub(crate) enum OpenFile {
     Mcap(McapFile),
     Sqlite(SqliteFile),
+    Ros1(Ros1File),
 }
 
 impl OpenFile {
@@ -23,6 +25,7 @@ impl OpenFile {
         match identify(path)? {
             FileKind::Mcap => McapFile::open(path, None).map(OpenFile::Mcap),
             FileKind::Sqlite3 => SqliteFile::open(path, None).map(OpenFile::Sqlite),
+            FileKind::Ros1 => Ros1File::open(path, None).map(OpenFile::Ros1),
             FileKind::Zstd => Self::open_compressed(path).map_err(|e| e.in_file(path)),
         }
     }
@@ -32,6 +35,7 @@ impl OpenFile {
         let opened = identify(&copy).and_then(|kind| match kind {
             FileKind::Mcap => McapFile::open(&copy, Some(copy.clone())).map(OpenFile::Mcap),
             FileKind::Sqlite3 => SqliteFile::open(&copy, Some(copy.clone())).map(OpenFile::Sqlite),
+            FileKind::Ros1 => Ros1File::open(&copy, Some(copy.clone())).map(OpenFile::Ros1),
             FileKind::Zstd => Err(BagError::unsupported(
                 path,
                 "a storage file compressed twice".into(),
@@ -66,6 +70,7 @@ impl OpenFile {
         match &mut self {
             OpenFile::Mcap(file) => file.note_damage(damage),
             OpenFile::Sqlite(file) => file.note_damage(damage),
+            OpenFile::Ros1(file) => file.note_damage(damage),
         }
         self
     }
@@ -74,6 +79,16 @@ impl OpenFile {
         match self {
             OpenFile::Mcap(file) => &file.info,
             OpenFile::Sqlite(file) => &file.info,
+            OpenFile::Ros1(file) => &file.info,
+        }
+    }
+
+    /// True if the messages are converted from ROS 1.
+    pub(crate) fn is_ros1(&self) -> bool {
+        match self {
+            OpenFile::Mcap(file) => file.is_ros1(),
+            OpenFile::Sqlite(_) => false,
+            OpenFile::Ros1(_) => true,
         }
     }
 
@@ -82,6 +97,7 @@ impl OpenFile {
         match self {
             OpenFile::Mcap(file) => file.claimed,
             OpenFile::Sqlite(file) => file.claimed(),
+            OpenFile::Ros1(file) => file.claimed,
         }
     }
 
@@ -89,6 +105,7 @@ impl OpenFile {
         match self {
             OpenFile::Mcap(file) => file.stream(filter),
             OpenFile::Sqlite(file) => file.stream(filter),
+            OpenFile::Ros1(file) => file.stream(filter),
         }
     }
 

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{BagError, metadata::Metadata, split::Split};
+use super::{BagError, metadata::Metadata, sniff::is_ros1, split::Split};
 
 /// Limit of storage files per bag.
 const MAX_FILES: usize = 100_000;
@@ -59,9 +59,13 @@ pub(crate) fn listed_splits(
 
 /// Storage files of a bag without `metadata.yaml`, in the order of their numbers.
 pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
-    let mut files = Vec::new();
+    let (mut files, mut ros1_files) = (Vec::new(), Vec::new());
     for entry in list(folder)? {
         let (file, name) = entry?;
+        let files = match is_ros1(&name) {
+            true => &mut ros1_files,
+            false => &mut files,
+        };
         if is_storage(&name) {
             inside(folder, &file)?;
             files.push(file);
@@ -69,10 +73,13 @@ pub(crate) fn splits_in(folder: &Path) -> Result<Vec<Split>, BagError> {
         too_many(folder, files.len())?;
     }
     if files.is_empty() {
+        files = ros1_files;
+    }
+    if files.is_empty() {
         return Err(BagError::Foreign {
             path: folder.to_path_buf(),
-            found: "a folder without metadata.yaml, .mcap or .db3 files".into(),
-            remedy: "give the folder that `ros2 bag record` made",
+            found: "a folder without metadata.yaml, .mcap, .db3 or .bag files".into(),
+            remedy: "give the folder that `ros2 bag record` made, or a .bag file of ROS 1",
         });
     }
     files.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
@@ -114,7 +121,7 @@ fn too_many(folder: &Path, files: usize) -> Result<(), BagError> {
 /// True for the name of a storage file, compressed or not.
 pub(crate) fn is_storage(name: &str) -> bool {
     let bare = name.strip_suffix(".zstd").unwrap_or(name);
-    bare.ends_with(".mcap") || bare.ends_with(".db3")
+    bare.ends_with(".mcap") || bare.ends_with(".db3") || is_ros1(bare)
 }
 
 /// Paths and names of the entries of a folder.

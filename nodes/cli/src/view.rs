@@ -97,7 +97,7 @@ fn kind(path: &Path) -> Kind {
     let ending = path.extension().and_then(|ending| ending.to_str());
     match ending.map(str::to_ascii_lowercase).as_deref() {
         _ if path.is_dir() || path.ends_with("metadata.yaml") => Kind::Log,
-        Some("mcap" | "db3" | "zstd" | "zst") => Kind::Log,
+        Some("mcap" | "db3" | "bag" | "active" | "zstd" | "zst") => Kind::Log,
         Some("yaml" | "yml") => Kind::Params,
         _ if is_named_as_points(path) && !is_map(path) => Kind::Points,
         _ => Kind::Map,
@@ -183,7 +183,7 @@ fn stay(url: &str) -> CliResult {
 pub fn serve_file(path: &Path, address: SocketAddr) -> CliResult<(viewer_server::Server, String)> {
     let (map, names) = crate::map::read_named(path).map_err(|error| {
         let points = "a point file (.ply, .pcd, .las, .laz, .e57, .bt, .xyz, .txt, .csv, .bin)";
-        let logs = "a log (a rosbag2 folder, .mcap, .db3, each also as .zstd)";
+        let logs = "a log (a rosbag2 folder, .mcap, .db3, .bag, each also as .zstd)";
         format!("{error}; what is shown is a map (.lattice), {points}, {logs}, or {PARAMS}")
     })?;
     serve(&map.into_list(usize::MAX), &names, address)

@@ -9,7 +9,7 @@ use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
 
 const ABOUT: &[About] = about! {
-    "bag" fixed(START): "rosbag2 directory, or one mcap or db3 file.";
+    "bag" fixed(START): "rosbag2 directory, one mcap or db3 file, or a ROS 1 bag.";
     "rate": "Log seconds per second.";
     "start_offset_s" fixed(START): "Start offset after the first message; latched messages before it are published first.";
     "duration_s" fixed(START): "Duration to play of the log; 0: to its end.";

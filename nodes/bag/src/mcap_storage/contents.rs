@@ -3,13 +3,15 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::Path,
+    sync::Arc,
 };
 
 use mcap::records::{Channel, Record};
 
 use super::lengths::parse_record;
 use crate::{
-    BagError, TopicInfo,
+    BagError, TopicInfo, ros1,
+    ros1::Transcoder,
     storage::{StorageInfo, TopicIndex, full_type_name, lenient_qos, merge_topic},
     topic::absolute_name,
 };
@@ -33,6 +35,12 @@ pub(super) struct Block {
     /// compressed: its damage is known.
     pub unchecked: bool,
 }
+
+/// Message encoding of ROS 1.
+const ROS1: &str = "ros1";
+
+/// Topic of each channel, and the converter of its messages if they are of ROS 1.
+pub(super) type Routes = BTreeMap<u16, (usize, Option<Arc<Transcoder>>)>;
 
 struct Schema {
     name: String,
@@ -115,14 +123,14 @@ impl Contents {
                 .all(|(id, count)| *count == 0 || self.channels.contains_key(id))
     }
 
-    /// Topics, and the topic of each channel. A file without CDR channels is rejected.
+    /// Topics, and the topic of each channel. A file without channels of ROS is rejected.
     pub(super) fn topics(
         &mut self,
         path: &Path,
         profile: &str,
-    ) -> Result<(StorageInfo, BTreeMap<u16, usize>), BagError> {
-        let is_cdr = |channel: &Channel| channel.message_encoding == "cdr";
-        if !self.channels.is_empty() && !self.channels.values().any(is_cdr) {
+    ) -> Result<(StorageInfo, Routes), BagError> {
+        let is_ros = |channel: &Channel| ["cdr", ROS1].contains(&&*channel.message_encoding);
+        if !self.channels.is_empty() && !self.channels.values().any(is_ros) {
             let encodings = self.channels.values().map(|c| c.message_encoding.as_str());
             let encodings = Vec::from_iter(encodings.collect::<BTreeSet<_>>());
             return Err(BagError::Foreign {
@@ -141,11 +149,48 @@ impl Contents {
         };
         let (mut topic_of, mut places) = (BTreeMap::new(), TopicIndex::default());
         for (id, channel) in &self.channels {
-            let topic = self.topic(*id, channel);
+            let (topic, transcoder) = match channel.message_encoding == ROS1 {
+                true => self.ros1_topic(*id, channel, path),
+                false => (self.topic(*id, channel), None),
+            };
             let index = merge_topic(&mut info.topics, &mut places, &topic, true);
-            topic_of.insert(*id, index);
+            topic_of.insert(*id, (index, transcoder));
         }
         Ok((info, topic_of))
+    }
+
+    /// Topic of a channel of ROS 1, and the converter of its messages.
+    fn ros1_topic(
+        &self,
+        id: u16,
+        channel: &Channel,
+        path: &Path,
+    ) -> (TopicInfo, Option<Arc<Transcoder>>) {
+        let schema = self.schemas.get(&channel.schema_id);
+        let transcoder = match schema.filter(|schema| schema.encoding == "ros1msg") {
+            Some(schema) => Transcoder::new(&schema.name, &schema.text).map(Arc::new),
+            None => Err("it has no schema of encoding ros1msg".to_owned()),
+        };
+        if let Err(reason) = &transcoder {
+            let (path, name) = (path.display(), &channel.topic);
+            log::warn!("{path}: {name} cannot be converted to ROS 2: {reason}");
+        }
+        let latching = channel.metadata.get("latching");
+        let is_latched = latching.is_some_and(|value| ros1::is_true(value.as_bytes()));
+        let transcoder = transcoder.ok();
+        let type_name = schema.map(|schema| ros1::ros2_name(&schema.name));
+        let topic = ros1::topic(
+            absolute_name(&channel.topic),
+            type_name.unwrap_or_default(),
+            is_latched,
+            transcoder.as_ref(),
+        );
+        let message_count = self.counts.get(&id).copied().unwrap_or(0);
+        let topic = TopicInfo {
+            message_count,
+            ..topic
+        };
+        (topic, transcoder)
     }
 
     fn topic(&self, id: u16, channel: &Channel) -> TopicInfo {

@@ -11,7 +11,6 @@ mod stream;
 mod summary;
 
 use std::{
-    collections::BTreeMap,
     fs::File,
     path::{Path, PathBuf},
     sync::Arc,
@@ -25,7 +24,7 @@ use super::{
     sniff::MCAP_MAGIC,
     storage::{Filter, StorageInfo, StorageStream},
 };
-use contents::Block;
+use contents::{Block, Routes};
 use lengths::parse_record;
 use records::{Cause, Place, RecordError, first_record};
 use stream::McapStream;
@@ -35,7 +34,7 @@ pub(crate) struct McapFile {
     path: PathBuf,
     temporary: Option<Arc<TempPath>>,
     blocks: Vec<Block>,
-    topic_of: Arc<BTreeMap<u16, usize>>,
+    topic_of: Arc<Routes>,
     damages: Vec<BagError>,
     /// True if messages outside of chunks, which have no checksum, may be altered.
     unchecked: bool,
@@ -103,6 +102,12 @@ impl McapFile {
         self.damages.push(damage);
         self.info.damage = self.damages.first().cloned();
         self.unchecked = true;
+    }
+
+    /// True if messages are converted from ROS 1.
+    pub(crate) fn is_ros1(&self) -> bool {
+        let converted = |(_, transcoder): &(_, Option<_>)| transcoder.is_some();
+        self.topic_of.values().any(converted)
     }
 
     /// Selected messages in order of log time.

@@ -2,7 +2,7 @@
 
 use std::{
     cmp::Reverse,
-    collections::{BTreeMap, BinaryHeap, VecDeque},
+    collections::{BinaryHeap, VecDeque},
     fs::File,
     io::{self, Cursor, Read, Seek, SeekFrom},
     ops::ControlFlow,
@@ -15,7 +15,7 @@ use tempfile::TempPath;
 
 use super::{
     McapFile,
-    contents::Block,
+    contents::{Block, Routes},
     packed::unpack,
     records::{Cause, Place, RecordError, parse_message, visit_chunk, visit_records},
     salvage,
@@ -36,7 +36,7 @@ pub(super) struct McapStream {
     /// Unread blocks, by time.
     blocks: VecDeque<Block>,
     blocks_read: u64,
-    topic_of: Arc<BTreeMap<u16, usize>>,
+    topic_of: Arc<Routes>,
     filter: Filter,
     waiting: BinaryHeap<Reverse<Waiting>>,
     waiting_bytes: u64,
@@ -52,6 +52,7 @@ struct Waiting {
     block: u64,
     record: u64,
     topic: usize,
+    channel: u16,
     unchecked: bool,
     data: Vec<u8>,
 }
@@ -71,7 +72,7 @@ impl McapStream {
             let has_topic = block.channels.as_ref().is_none_or(|channels| {
                 channels
                     .iter()
-                    .any(|id| topic_of.get(id).is_none_or(|t| filter.wants_topic(*t)))
+                    .any(|id| topic_of.get(id).is_none_or(|(t, _)| filter.wants_topic(*t)))
             });
             // Empty chunks may have a reversed time range.
             let is_meant = filter.past_damage || !block.behind;
@@ -130,6 +131,26 @@ impl McapStream {
             }
         }
         Ok(())
+    }
+
+    /// The buffered message; as CDR if it is of ROS 1.
+    fn converted(&self, message: Waiting) -> Result<StorageMessage, BagError> {
+        let route = self.topic_of.get(&message.channel);
+        let data = match route.and_then(|(_, transcoder)| transcoder.as_ref()) {
+            None => message.data,
+            Some(transcoder) => transcoder.to_cdr(&message.data).map_err(|reason| {
+                let (log_time_ns, channel) = (message.log_time_ns, message.channel);
+                let position = format!("the message of channel {channel} at {log_time_ns} ns");
+                let remedy = "take another copy, or rescue the rest with `lattice bag recover`";
+                BagError::corrupt(&self.path, position, reason, remedy)
+            })?,
+        };
+        Ok(StorageMessage {
+            topic: message.topic,
+            log_time_ns: message.log_time_ns,
+            unchecked: message.unchecked,
+            data,
+        })
     }
 
     /// Reads the messages of a block of the file, or of the content of a damaged chunk.
@@ -199,12 +220,12 @@ impl McapStream {
 fn wanted(
     place: Place,
     body: &[u8],
-    topic_of: &BTreeMap<u16, usize>,
+    topic_of: &Routes,
     filter: &Filter,
     (block, unchecked): (u64, bool),
 ) -> Result<Option<Waiting>, RecordError> {
     let (header, data) = parse_message(place, body)?;
-    let Some(&topic) = topic_of.get(&header.channel_id) else {
+    let Some(&(topic, _)) = topic_of.get(&header.channel_id) else {
         let reason = format!("a message of unknown channel {}", header.channel_id);
         return Err(RecordError::bad(place, reason));
     };
@@ -217,6 +238,7 @@ fn wanted(
         block,
         record: place.in_chunk.unwrap_or(place.byte),
         topic,
+        channel: header.channel_id,
         unchecked,
         data: data.to_vec(),
     }))
@@ -248,19 +270,7 @@ impl Iterator for McapStream {
         }
         if let Some(Reverse(message)) = self.waiting.pop() {
             self.waiting_bytes = self.waiting_bytes.saturating_sub(message.bytes());
-            let Waiting {
-                log_time_ns,
-                topic,
-                unchecked,
-                data,
-                ..
-            } = message;
-            return Some(Ok(StorageMessage {
-                topic,
-                log_time_ns,
-                unchecked,
-                data,
-            }));
+            return Some(self.converted(message));
         }
         self.damages.pop_front().map(Err)
     }

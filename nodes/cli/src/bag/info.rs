@@ -12,7 +12,7 @@ use crate::{CliResult, calendar};
 /// Options of `lattice bag info`.
 #[derive(Args)]
 pub struct Info {
-    /// rosbag2 directory, or an .mcap or .db3 file of one
+    /// rosbag2 directory, an .mcap or .db3 file of one, or a ROS 1 bag
     bag: PathBuf,
     /// Print it as JSON
     #[arg(long)]
@@ -22,7 +22,10 @@ pub struct Info {
 /// Summary of a log.
 #[derive(Serialize)]
 struct Summary {
+    /// `mcap`, `sqlite3` or `rosbag1`.
     storage: &'static str,
+    /// True if messages and types are converted from ROS 1.
+    is_ros1: bool,
     /// ROS distribution of the recorder; null if not recorded.
     ros_distro: Option<String>,
     files: usize,
@@ -101,7 +104,8 @@ impl Summary {
         });
         let topics = topics.collect();
         Ok(Summary {
-            storage: reader.storage().identifier(),
+            storage: reader.storage_name(),
+            is_ros1: reader.is_ros1(),
             ros_distro: Some(reader.ros_distro().to_owned()).filter(|name| !name.is_empty()),
             files: reader.files().count(),
             bytes: reader.files().map(size).sum(),
@@ -119,7 +123,11 @@ impl Summary {
     fn print(&self) {
         let files = if self.files == 1 { "file" } else { "files" };
         let (number, bytes) = (self.files, megabytes(self.bytes));
-        println!("storage   {}, {number} {files}, {bytes}", self.storage);
+        let storage = match self.is_ros1 && self.storage != "rosbag1" {
+            true => format!("{} of ROS 1", self.storage),
+            false => self.storage.to_owned(),
+        };
+        println!("storage   {storage}, {number} {files}, {bytes}");
         if let Some(name) = &self.ros_distro {
             println!("distro    {}", plain(name));
         }

@@ -1,4 +1,4 @@
-//! `lattice bag`: inspection and recovery of logs.
+//! `lattice bag`: inspection, conversion and recovery of logs.
 
 mod frames;
 mod info;
@@ -6,23 +6,38 @@ mod info;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use lattice_bag::{Recovered, Unchecked, recover};
+use lattice_bag::{Converted, Recovered, Unchecked, convert, recover};
 
 use crate::{CliResult, init_logging};
 
-/// Inspect and recover rosbag2 logs
+/// Inspect, convert and recover logs
 #[derive(Subcommand)]
 pub enum Bag {
     /// Show topics, rates, frames, times and size of a log, even if its recorder was killed
     Info(info::Info),
+    /// Write a log of ROS 1 (.bag) as a rosbag2 log (MCAP), for all tools of ROS 2
+    Convert(Convert),
     /// Copy the readable part of a damaged log to a new log, and report the losses
     Recover(Recover),
+}
+
+/// Options of `lattice bag convert`.
+#[derive(Args)]
+pub struct Convert {
+    /// ROS 1 bag, finished or not, a directory of split ones, or any other log
+    bag: PathBuf,
+    /// Directory of the new log, which must not exist
+    #[arg(long, short)]
+    out: PathBuf,
+    /// Print the result as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 /// Options of `lattice bag recover`.
 #[derive(Args)]
 pub struct Recover {
-    /// rosbag2 directory, or an .mcap or .db3 file of one
+    /// rosbag2 directory, an .mcap or .db3 file of one, or a ROS 1 bag
     bag: PathBuf,
     /// Directory of the new log, which must not exist
     #[arg(long, short)]
@@ -38,6 +53,7 @@ impl Bag {
         init_logging();
         let command = match self {
             Bag::Info(command) => return command.run(),
+            Bag::Convert(command) => return command.run(),
             Bag::Recover(command) => command,
         };
         let recovered = recover(&command.bag, &command.out)?;
@@ -49,6 +65,27 @@ impl Bag {
         if recovered.is_nothing() {
             let bag = command.bag.display();
             return Err(format!("{bag}: nothing can be recovered; take another copy").into());
+        }
+        Ok(())
+    }
+}
+
+impl Convert {
+    fn run(self) -> CliResult {
+        let converted = convert(&self.bag, &self.out)?;
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&converted)?);
+            return Ok(());
+        }
+        let Converted {
+            messages, topics, ..
+        } = converted;
+        println!("{messages} messages of {topics} topics converted");
+        for reason in &converted.left_out {
+            println!("left out: {reason}");
+        }
+        for cut in &converted.cuts {
+            println!("cut: {cut}");
         }
         Ok(())
     }

@@ -31,7 +31,7 @@ const MAX_LOOPBACK_LATTICES: usize = 5;
 /// Map a rosbag2 log
 #[derive(Args, Clone, Debug, Default)]
 pub struct Replay {
-    /// rosbag2 directory, or one mcap or db3 file of it
+    /// rosbag2 directory, one mcap or db3 file of it, or a ROS 1 bag
     pub bag: PathBuf,
     /// Run the nodes' state machines in this process, as fast as possible, instead of playing
     /// the log over DDS to one process per node

@@ -69,6 +69,23 @@ pub fn sqlite3(log: &'static str) -> Case {
     stored("sqlite3", log)
 }
 
+/// Logs of drivers as ROS 1 bags: each compression, without index, in several files.
+pub fn ros1() -> Vec<Case> {
+    vec![
+        stored("ros1", "ouster"),
+        stored("ros1_bz2", "velodyne_robot_localization"),
+        stored("ros1_lz4", "livox_ros_driver"),
+        stored("ros1_active", "rplidar"),
+        stored("ros1_split", "urg_node_echoes"),
+        stored("ros1_lz4_split", "point_cloud_1"),
+        stored("ros1_bz2_active", "amcl"),
+        stored("ros1_lz4_active", "clearpath_tf_alone"),
+        stored("ros1_bz2", "novatel_inspvax"),
+        stored("ros1_lz4", "motion_capture"),
+        stored("ros1", "gps_1_hz_imu_100_hz"),
+    ]
+}
+
 pub fn cases() -> Vec<Case> {
     [drivers(), oddities()].concat()
 }

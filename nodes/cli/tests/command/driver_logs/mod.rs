@@ -161,6 +161,39 @@ fn logs_of_drivers_give_the_reference_map_or_say_what_is_missing() {
     });
 }
 
+/// The same bags as a directory and, converted, as rosbag2.
+#[test]
+fn ros1_bags_give_the_map_of_their_rosbag2_twins() {
+    let directory = tempfile::tempdir().unwrap();
+    let folder = directory.path();
+    let cases = cases::ros1();
+    let Some(made) = Made::of(&cases, folder) else {
+        return;
+    };
+    check_all(&cases, |case| {
+        let map = folder.join("map.lattice");
+        let options = ["--direct", "--map-out", &map.display().to_string()];
+        replay(case, folder, &options)?;
+        compare(&cells_of_file(&map), &made.cells(case.log))?;
+        let [bag, out] = ["", "_converted"].map(|ending| {
+            let bag = folder.join(format!("{}{ending}", case.log));
+            bag.display().to_string()
+        });
+        let output = lattice(&["bag", "convert", &bag, "--out", &out]);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        if !output.status.success() {
+            return Err(format!("bag convert: {errors}"));
+        }
+        let direct = std::fs::read(&map).unwrap();
+        let output = lattice(&[&["replay", &out], &options[..]].concat());
+        let errors = String::from_utf8_lossy(&output.stderr);
+        match output.status.success() && std::fs::read(&map).unwrap() == direct {
+            true => Ok(()),
+            false => Err(format!("not the map of the bag itself: {errors}")),
+        }
+    });
+}
+
 /// Lines in the last column of the tables of a page: its code spans, but for those said to be in the report.
 fn quoted_lines(page: &str) -> Vec<String> {
     let rows = page.lines().filter(|line| line.starts_with('|'));
