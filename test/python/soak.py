@@ -1,6 +1,6 @@
 """The nodes in processes of their own, for hours: one log again and again, a new player each time.
 
-    soak.py LATTICE DIRECTORY MINUTES [--hostile]     ROS_DOMAIN_ID as the nodes take it
+    soak.py LATTICE DIRECTORY MINUTES [--hostile | --foreign | --zenoh]     ROS_DOMAIN_ID as the nodes take it
 
 After each loop every cloud must have been counted, and the map must be that of the loop before, at last
 that of `lattice replay --direct`; then the mapper is reset. Memory, descriptors and threads of each process are written to
@@ -8,7 +8,8 @@ DIRECTORY/soak.csv and must be flat from the second quarter to the last one. The
 after the reset, when all followers have followed it.
 
 With `--hostile` there are more nodes, and the clients of hostile_clients.py attack them in every loop but the last, after
-which the maps of all nodes must be the mapper's again.
+which the maps of all nodes must be the mapper's again. With `--foreign` a viewer in each rclpy of LATTICE_ROS_PYTHON must
+have the markers of every map. With `--zenoh` all of it goes through a router of Zenoh.
 """
 
 import atexit
@@ -22,8 +23,7 @@ import sys
 import time
 from pathlib import Path
 
-from cyclone_peer import Peer, qos
-import ros_idl as ros
+from soak_observer import OverDds, OverZenoh, Router
 
 PARAMS = Path(__file__).parents[2] / "params/bobcat.yaml"
 LOG_S = 20
@@ -61,11 +61,6 @@ HELD = "held_player"
 # Growth of the resident memory that is no leak: pages that an allocator keeps, and buffers.
 FLAT = 1.05
 SLACK_KB = 2048
-
-SaveMapRequest = ros.ros("lattice_msgs/srv/SaveMap_Request", **ros.ASKED, path=str)
-SaveMapResponse = ros.ros(
-    "lattice_msgs/srv/SaveMap_Response", **ros.ASKED, success=bool, message=str, voxels=ros.uint64
-)
 
 
 class Node:
@@ -106,41 +101,19 @@ class Node:
         return json.loads(self.report.read_text())
 
 
-class Observer:
-    """A foreign peer that counts, saves and resets the map."""
+class Soak:
+    """What an observer hears of the nodes."""
 
-    def __init__(self):
-        self.peer, self.values, self.number = Peer(int(os.environ["ROS_DOMAIN_ID"])), {}, 0
-        self.replies = {}
-        self.peer.reader("rt/diagnostics", ros.DiagnosticArray, qos(100), self.diagnosed)
-        self.save = self.client("save_map", SaveMapRequest, SaveMapResponse)
-        self.reset = self.client("reset", ros.TriggerRequest, ros.TriggerResponse)
-        self.peer.until_matched()
-
-    def client(self, service, request, response):
-        service = f"lattice_mapper/{service}"
-
-        def answered(reply):
-            self.replies[reply.number] = reply
-
-        writer = self.peer.writer(f"rq/{service}Request", request, qos(10))
-        self.peer.reader(f"rr/{service}Reply", response, qos(10), answered)
-        return lambda argument: self.ask(writer, request, argument)
-
-    def diagnosed(self, message):
-        for status in message.status:
-            self.values[status.name] = {value.key: value.value for value in status.values}
+    def __init__(self, observer):
+        self.observer = observer
 
     def clouds(self):
         """Clouds that the mapper has counted."""
-        return int(self.values.get("lattice_mapper: map", {}).get("clouds_in", 0))
+        return int(self.observer.count("lattice_mapper", "map", "clouds_in") or 0)
 
     def followed(self, nodes):
         """Voxels of the mapper's map, and of those that the other nodes have of it."""
-
-        def shown(node, task, key):
-            return self.values.get(f"{node}: {task}", {}).get(key)
-
+        shown = self.observer.count
         followers = {node: shown(node, *FOLLOWED[node]) for node in nodes if node in FOLLOWED}
         return {"lattice_mapper": shown("lattice_mapper", "map", "voxels")} | followers
 
@@ -151,15 +124,28 @@ class Observer:
             found = set(self.followed(nodes).values())
             return len(found) == 1 and voxels in (None, *found)
 
-        self.peer.until(agreed, lambda: f"the maps differ: {self.followed(nodes)}")
+        self.observer.until(agreed, lambda: f"the maps differ: {self.followed(nodes)}")
 
-    def ask(self, writer, request, argument):
-        self.number += 1
-        number = self.number
-        writer.write(request(1, number, argument))
-        self.peer.until(lambda: number in self.replies, lambda: "no reply")
-        reply = self.replies.pop(number)
-        assert reply.success, reply.message
+
+class Viewer:
+    """A viewer in rclpy, in a process of its own."""
+
+    def __init__(self, python):
+        program = Path(__file__).with_name("soak_viewer.py")
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+        self.process = subprocess.Popen([python, program, os.environ["ROS_DOMAIN_ID"]], **pipes)
+        atexit.register(self.process.kill)
+        self.line()
+
+    def line(self):
+        line = self.process.stdout.readline()
+        assert line, "a viewer has ended"
+        return line
+
+    def look(self, points):
+        """Waits until it has so many points."""
+        print(points, file=self.process.stdin, flush=True)
+        return json.loads(self.line())
 
 
 class Hostile:
@@ -208,12 +194,15 @@ def grown(sizes):
     return f"{then} -> {last}" if memory or last[1:] > then[1:] else ""
 
 
-def start(lattice, directory, log, hostile):
+def start(lattice, directory, log, kind):
     """The nodes but for the player, and the port of the viewer."""
+    hostile = kind == "--hostile"
     port, options = free_port(), {"lattice_mapper": {"map_dir": directory.absolute()}}
     # Poses may come late on a machine with other work.
     options["enu_transformer"] = {"max_wait_s": 10.0}
     options["viewer_server"] = {"port": port}
+    # A point for each voxel, which the viewers count.
+    options["voxel_marker_publisher"] = {"style": "points"} if kind == "--foreign" else {}
     names = STEADY + (ATTACKED if hostile else [])
     nodes = [Node(lattice, name, directory, **options.get(name, {})) for name in names]
     if hostile:
@@ -225,18 +214,28 @@ def start(lattice, directory, log, hostile):
     return nodes, port
 
 
+def observe(router):
+    domain = int(os.environ["ROS_DOMAIN_ID"])
+    return OverZenoh(domain, router.endpoint) if router else OverDds(domain)
+
+
 def main():
     lattice, directory, minutes = sys.argv[1], Path(sys.argv[2]), float(sys.argv[3])
-    hostile = sys.argv[4:] == ["--hostile"]
-    assert hostile or len(sys.argv) == 4, __doc__
+    kind = "".join(sys.argv[4:])
+    assert kind in ("", "--hostile", "--foreign", "--zenoh"), __doc__
+    hostile = kind == "--hostile"
     # The nodes end with it.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     directory.mkdir(parents=True, exist_ok=True)
     log, wanted = prepare(lattice, directory)
     clouds, first = wanted["counts"]["clouds_in"], None
-    nodes, port = start(lattice, directory, log, hostile)
-    observer, saved = Observer(), directory / "saved.lattice"
+    router = Router(free_port()) if kind == "--zenoh" else None
+    nodes, port = start(lattice, directory, log, kind)
+    observer, saved = observe(router), directory / "saved.lattice"
+    soak = Soak(observer)
     clients, attacks = Hostile(port) if hostile else None, {}
+    pythons = os.environ["LATTICE_ROS_PYTHON"].split(":") if kind == "--foreign" else []
+    viewers = [Viewer(python) for python in pythons]
     sizes, end, loops = {node.name: [] for node in nodes}, time.monotonic() + 60 * minutes, 0
     with open(directory / "soak.csv", "w") as table:
         print("loop,node,resident_kb,threads,descriptors", file=table)
@@ -250,10 +249,11 @@ def main():
             played = player.ended()
             assert played["acknowledged"] and played["failed"] == 0, played
             loops += 1
-            observer.peer.until(
-                lambda: observer.clouds() >= loops * clouds,
+            observer.until(
+                lambda: soak.clouds() >= loops * clouds,
                 lambda: f"loop {loops}: {loops * clouds} clouds went in, {observer.values}",
             )
+            seen = [viewer.look(wanted["voxels"]) for viewer in viewers]
             if clients and not is_last:
                 attacks = clients.rest()
             observer.save(saved.name)
@@ -261,13 +261,13 @@ def main():
             assert saved.read_bytes() == first, f"loop {loops} made another map: {saved}"
             if is_last:
                 break
-            observer.reset(0)
+            observer.reset()
             # A forged map of 350,000 voxels is in no node then.
-            observer.agree(list(sizes), "0")
+            soak.agree(list(sizes), "0")
             for node in nodes:
                 sizes[node.name].append(node.sizes())
                 print(loops, node.name, *sizes[node.name][-1], sep=",", file=table, flush=True)
-    observer.agree(list(sizes))
+    soak.agree(list(sizes))
     if hostile:
         assert all(attacks.values()), f"clients that did nothing: {attacks}"
         for task, keys in FELT.items():
@@ -282,7 +282,9 @@ def main():
     leaks = {name: grown(of) for name, of in sizes.items() if grown(of)}
     ends = {name: {"second loop": of[1], "last": of[-1]} for name, of in sizes.items()}
     result = {"loops": loops, "clouds": loops * clouds, "sizes": ends, "grown": leaks}
-    print(json.dumps(result | ({"attacks": attacks} if hostile else {})))
+    result |= {"attacks": attacks} if hostile else {}
+    result |= {"viewers": seen} if viewers else {}
+    print(json.dumps(result))
     sys.exit(1 if leaks else 0)
 
 

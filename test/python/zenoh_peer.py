@@ -112,13 +112,13 @@ class Peer:
         self.kept.append(self.session.liveliness().declare_token(key))
         return gid(key)
 
-    def token_of_ours(self, kind, name):
-        """The token of an endpoint of /ours, by the parts that count."""
+    def token_of(self, node, kind, name):
+        """The token of an endpoint of a node, by the parts that count."""
 
         def found():
             for key in self.tokens:
                 parts = key.split("/")
-                if parts[5:6] == [kind] and parts[8:10] == ["ours", name.replace("/", "%")]:
+                if parts[5:6] == [kind] and parts[8:10] == [node, name.replace("/", "%")]:
                     return key
             return None
 
@@ -155,7 +155,7 @@ def meet(endpoint, domain):
     latched.put(text("old"), attachment=attachment(1, gid_of))
     latched.put(text("kept"), attachment=attachment(2, gid_of))
     heard_latched = []
-    token = peer.token_of_ours("MP", "/latched_by_ours")
+    token = peer.token_of("ours", "MP", "/latched_by_ours")
     result["latched_token"] = token.split("/")[9:]
     peer.kept.append(
         ext.declare_advanced_subscriber(
@@ -174,7 +174,7 @@ def meet(endpoint, domain):
 
     # Messages of ours.
     chatter = []
-    token = peer.token_of_ours("MP", "/chatter")
+    token = peer.token_of("ours", "MP", "/chatter")
     result["chatter_token"] = token.split("/")[9:]
     peer.kept.append(
         peer.session.declare_subscriber(
@@ -187,7 +187,7 @@ def meet(endpoint, domain):
     result["chatter"] = [[content, number, of == gid(token)] for content, number, of in chatter[:3]]
 
     # A call of a service of ours.
-    token = peer.token_of_ours("SS", "/ours/reset")
+    token = peer.token_of("ours", "SS", "/ours/reset")
     result["service_token"] = token.split("/")[9:]
     of = peer.token("SC", "/ours/reset", trigger, RELIABLE)
     replies = peer.session.get(
@@ -203,7 +203,7 @@ def meet(endpoint, domain):
         result["reply"] = [bytes(reply.ok.payload).hex(), number, client == of]
 
     # Messages to ours, and rubbish between them.
-    peer.token_of_ours("MS", "/heard")
+    peer.token_of("ours", "MS", "/heard")
     of = peer.token("MP", "/heard", string, RELIABLE)
     key = peer.key("/heard", string)
     publisher = peer.session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
@@ -237,7 +237,7 @@ def meet(endpoint, domain):
         result.setdefault("rubbish_replies", []).append(len([r for r in replies if r.ok]))
 
     peer.until("the call of ours", lambda: len(asked) > 0)
-    client = peer.token_of_ours("SC", "/peer/trigger")
+    client = peer.token_of("ours", "SC", "/peer/trigger")
     number, of, payload = asked[0]
     result["asked"] = [number, of == gid(client).hex(), payload]
     result["zid"], result["latched_gid"] = peer.zid, latched_gid.hex()
@@ -257,9 +257,10 @@ def main(role, endpoint, domain="0"):
         meet(endpoint, int(domain))
 
 
-try:
-    main(*sys.argv[1:])
-except BaseException:
-    traceback.print_exc()
-    # The threads of a session that is open would go on.
-    os._exit(1)
+if __name__ == "__main__":
+    try:
+        main(*sys.argv[1:])
+    except BaseException:
+        traceback.print_exc()
+        # The threads of a session that is open would go on.
+        os._exit(1)
