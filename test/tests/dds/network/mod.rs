@@ -292,8 +292,9 @@ mod zenoh {
         };
         let [reliable, best_effort, kept] = lost(&books);
         assert_eq!((reliable, kept), (0, 0));
-        // What does not fit into the buffers of the kernel is left out.
-        assert!(best_effort > 100, "{best_effort}");
-        assert!(books["/reliable"].0.dropped > 100);
+        // What does not fit into the buffers of the kernel is left out, here or on the way.
+        let not_sent = |topic| books[topic].0.dropped;
+        assert!(not_sent("/best_effort") + best_effort > 100);
+        assert!(not_sent("/reliable") > 100);
     }
 }
