@@ -215,6 +215,12 @@ def meet(endpoint, domain):
     publisher.put(b"", attachment=attachment(3, of))
     publisher.delete()
     publisher.put(text("two"), attachment=attachment(4, of))
+    # Three are missing here, then none: one again, an older one, and the first of another publisher.
+    for number, data in [(8, "eight"), (8, "again"), (2, "old"), (9, "nine")]:
+        publisher.put(text(data), attachment=attachment(number, of))
+    other = peer.token("MP", "/heard", string, RELIABLE)
+    for number, data in [(1000, "other"), (1002, "gap")]:
+        publisher.put(text(data), attachment=attachment(number, other))
     for rubbish in [
         f"@ros2_lv/{domain}/rubbish",
         f"@ros2_lv/{domain}/1/0/0/XX/%/%/rubbish",

@@ -274,6 +274,11 @@ pub(crate) trait SampleWriter: Send + Sync {
         related: Option<SampleId>,
     ) -> BoxFuture<'_, Result<(), WriteRefusal>>;
 
+    /// True if this body is sent although its write was given up.
+    fn is_sending(&self, _: &Bytes) -> bool {
+        false
+    }
+
     /// Samples not yet acknowledged, or left unacknowledged by reliable readers that have left.
     /// 0 if the transport does not report them.
     fn unacknowledged(&self) -> u64 {

@@ -234,3 +234,50 @@ fn offered(topic: &TopicInfo) -> Qos {
         kept: None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn depth_of(recorded: &[BagQos]) -> usize {
+        let topic = TopicInfo {
+            name: "/points".to_owned(),
+            offered_qos: recorded.to_vec(),
+            ..TopicInfo::default()
+        };
+        offered(&topic).depth
+    }
+
+    #[test]
+    fn a_publisher_has_the_depth_that_was_recorded_within_its_bound() {
+        let volatile = |depth| BagQos {
+            depth,
+            ..BagQos::default()
+        };
+        for (recorded, expected) in [
+            (0, 1),
+            (1, 1),
+            (1000, 1000),
+            (1001, 1001),
+            (10_000, 10_000),
+            (10_001, 10_000),
+            (u64::MAX, 10_000),
+        ] {
+            assert_eq!(depth_of(&[volatile(recorded)]), expected, "{recorded}");
+        }
+        assert_eq!(depth_of(&[]), 10);
+        assert_eq!(depth_of(&[volatile(7), volatile(5000)]), 5000);
+        let all = BagQos {
+            keep_all: true,
+            ..volatile(0)
+        };
+        assert_eq!(depth_of(&[all]), 10_000);
+        // Kept for late joiners: the last ones of all publishers.
+        let latched = |depth| BagQos {
+            latched: true,
+            ..volatile(depth)
+        };
+        assert_eq!(depth_of(&[latched(300), latched(400)]), 700);
+        assert_eq!(depth_of(&[latched(u64::MAX), latched(1)]), 1000);
+    }
+}

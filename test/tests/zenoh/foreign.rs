@@ -44,7 +44,9 @@ fn a_peer_by_the_book_hears_and_is_heard_and_its_rubbish_is_counted() {
     for i in 0..3 {
         chatter.publish(text(i)).unwrap();
     }
-    for data in ["one", "two"] {
+    for data in [
+        "one", "two", "eight", "again", "old", "nine", "other", "gap",
+    ] {
         assert_eq!(heard.recv_timeout(PATIENCE).unwrap().data, data);
     }
     // What the peer had said before this subscription was there.
@@ -123,7 +125,9 @@ fn a_peer_by_the_book_hears_and_is_heard_and_its_rubbish_is_counted() {
         durability: Durability::TransientLocal,
     };
     assert!(node.remote_publishers().contains(&publisher));
-    assert_eq!(subscription.publisher_count(), 1);
+    assert_eq!(subscription.publisher_count(), 2);
+    // 5 to 7 of the one, 1001 of the other.
+    assert_eq!(subscription.lost_on_network(), 4);
     // Nameless, short, without gid, too long, empty: all between those that were heard.
     assert_eq!(subscription.undecodable(), 5);
     peer.finish();

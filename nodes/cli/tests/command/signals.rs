@@ -3,12 +3,19 @@
 use std::io::{BufRead, BufReader, Write, stderr};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
-use lattice_runtime::LoopbackDomain;
+use lattice_msgs::diagnostic_msgs::DiagnosticArray;
+use lattice_msgs::nav_msgs::OccupancyGrid;
+use lattice_msgs::visualization_msgs::MarkerArray;
+use lattice_runtime::qos::Qos;
+use lattice_runtime::{LoopbackDomain, SubscriptionExecutor};
 use serde_json::Value;
 use wait_timeout::ChildExt;
 
+use crate::names::peer;
 use crate::nodes::simulated;
 use crate::record::{expect, play, signal, start};
 use crate::{PATIENCE, json};
@@ -119,6 +126,77 @@ fn a_mapper_of_two_million_voxels_ends_in_time_with_its_report() {
     let report = interrupted(mapper, Path::new(&report));
     assert_eq!(report["voxels"], cells);
     assert_eq!(report["counts"]["keyframes"], 0);
+}
+
+/// Each node that follows a map of two million voxels, while others draw it, ends in time.
+#[test]
+fn followers_of_two_million_voxels_end_in_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let cells = grid_map(folder.path(), 128);
+    let domain = LoopbackDomain::take().unwrap();
+    let runtime = peer(&domain);
+    let node = runtime.node("peer").unwrap();
+    let (state, stated) = channel();
+    let hear = move |all: Arc<DiagnosticArray>| drop(state.send(all));
+    let shared = SubscriptionExecutor::Shared;
+    let diagnostics = node.subscribe("/diagnostics", Qos::DIAGNOSTICS, shared, hear);
+    let _diagnostics = diagnostics.unwrap();
+    // What is subscribed to is drawn.
+    let drawn = |_: Arc<MarkerArray>| {};
+    let dedicated = SubscriptionExecutor::Dedicated;
+    let markers = node.subscribe("/robot/voxel_markers", Qos::MARKERS, dedicated, drawn);
+    let _markers = markers.unwrap();
+    let drawn = |_: Arc<OccupancyGrid>| {};
+    let grids = node.subscribe("/robot/projected_map", Qos::LATCHED, dedicated, drawn);
+    let _grids = grids.unwrap();
+
+    let report = |name: &str| folder.path().join(name);
+    let launch = |name: &str, namespace: &str, params: &[&str]| {
+        let report_file = format!("report_file:={}", report(name).display());
+        let namespace = format!("__ns:={namespace}");
+        let params = params.iter().copied().chain([&*report_file]);
+        let params = params.flat_map(|param| ["-p", param]);
+        let node = ["node", name, "--ros-args", "-r", &namespace].into_iter();
+        start(&domain, &node.chain(params).collect::<Vec<_>>())
+    };
+    // Each with its task, and the value there that counts the voxels of its map.
+    let followers = [
+        ("voxel_marker_publisher", "/robot", "markers", "voxels"),
+        ("semantic_icp_server", "/robot", "calibration", "map_voxels"),
+        ("map_projector", "/robot", "grid", "voxels"),
+        ("map_merger", "/", "merged map", "voxels"),
+    ];
+    let started = followers.map(|(name, namespace, ..)| {
+        let params: &[&str] = match name {
+            "map_merger" => &["robots:=[robot]"],
+            _ => &[],
+        };
+        let mut follower = launch(name, namespace, params);
+        expect(&mut follower, &[name]);
+        follower
+    });
+    let map_dir = format!("map_dir:={}", folder.path().display());
+    let of_cubes = ["lattice:=cubic", "cell_volume_m3:=1.0", "resume:=true"];
+    let params = [&of_cubes[..], &[&map_dir]].concat();
+    let mut mapper = launch("lattice_mapper", "/robot", &params);
+    expect(&mut mapper, &["resumed with"]);
+    let all = cells.to_string();
+    for ((name, _, task, key), follower) in followers.into_iter().zip(started) {
+        let late = Instant::now() + PATIENCE;
+        let has_all = |message: &DiagnosticArray| {
+            let mut of_task = message.status.iter();
+            let status = of_task.find(|of| of.name.ends_with(&format!("{name}: {task}")));
+            let mut values = status.into_iter().flat_map(|status| &status.values);
+            values.any(|value| value.key == key && value.value == all)
+        };
+        while !has_all(&stated.recv_timeout(PATIENCE).unwrap()) {
+            assert!(Instant::now() < late, "{name} has no map");
+        }
+        let report = interrupted(follower, &report(name));
+        let counted = report.get(key).unwrap_or(&report["counts"][key]);
+        assert_eq!(*counted, cells, "{name}: {report}");
+    }
+    interrupted(mapper, &report("lattice_mapper"));
 }
 
 #[test]

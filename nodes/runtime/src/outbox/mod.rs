@@ -212,10 +212,8 @@ impl Outbox {
     /// Waits until a sample of `bytes` fits into the queue. False: timeout.
     pub(crate) fn has_room_within(&self, bytes: usize, patience: Duration) -> bool {
         let room = async {
-            self.shared
-                .budget
-                .room(bytes, || !self.jobs.is_full())
-                .await;
+            let budget = &self.shared.budget;
+            budget.room(bytes, || !self.jobs.is_full()).await;
             true
         };
         let late = async {
@@ -309,6 +307,11 @@ impl Shared {
         }
     }
 
+    fn count_sent(&self, body: &Bytes) {
+        self.sent.fetch_add(1, Relaxed);
+        self.sent_bytes.fetch_add(body.len() as u64, Relaxed);
+    }
+
     fn body(&self, content: Content) -> Option<Bytes> {
         match content {
             Content::Body(body) => Some(body),
@@ -349,23 +352,20 @@ impl Shared {
                 }
                 Either::Right(_) => {
                     self.stuck.store(true, Relaxed);
-                    self.drop_one("a reliable subscriber does not keep up");
-                    return;
+                    return match writer.is_sending(&body) {
+                        true => self.count_sent(&body),
+                        false => self.drop_one("a reliable subscriber does not keep up"),
+                    };
                 }
             };
             match result {
                 Ok(_) => {
                     self.stuck.store(false, Relaxed);
-                    self.sent.fetch_add(1, Relaxed);
-                    self.sent_bytes.fetch_add(body.len() as u64, Relaxed);
-                    return;
+                    return self.count_sent(&body);
                 }
                 // The transport's timeout is shorter; our own patience decides.
                 Err(WriteRefusal::Full) => {}
-                Err(WriteRefusal::Failed(why)) => {
-                    self.drop_one(&why);
-                    return;
-                }
+                Err(WriteRefusal::Failed(why)) => return self.drop_one(&why),
             }
         }
     }

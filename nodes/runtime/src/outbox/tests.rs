@@ -42,6 +42,44 @@ impl SampleWriter for Prompt {
     }
 }
 
+/// A writer that sends the first sample later than the queue waits, and then no other.
+struct Late(AtomicUsize);
+
+impl SampleWriter for Late {
+    fn id(&self) -> EndpointId {
+        EndpointId([9; 16])
+    }
+
+    fn write(&self, _: Bytes, _: Option<SampleId>) -> BoxFuture<'_, Result<(), WriteRefusal>> {
+        self.0.fetch_add(1, Relaxed);
+        Box::pin(smol::future::pending())
+    }
+
+    fn is_sending(&self, _: &Bytes) -> bool {
+        self.0.load(Relaxed) == 1
+    }
+
+    fn wait_for_acknowledgments(&self, _: Duration) -> bool {
+        false
+    }
+}
+
+#[test]
+fn a_sample_that_is_still_being_sent_is_not_counted_as_dropped() {
+    let late = Arc::new(Late(AtomicUsize::new(0)));
+    let (outbox, task) = Outbox::new("/chatter", late, WhenFull::Drop, 9, usize::MAX);
+    for body in [&b"first"[..], b"second", b"third"] {
+        outbox.send_body(Bytes::from_static(body), None).unwrap();
+    }
+    let flushed = or(async { outbox.flushed().await.is_some() }, async {
+        task.await;
+        false
+    });
+    assert!(smol::block_on(flushed));
+    assert_eq!((outbox.sent(), outbox.sent_bytes()), (1, 5));
+    assert_eq!(outbox.dropped(), 2);
+}
+
 #[test]
 fn all_is_acknowledged_once_the_queue_is_empty() {
     let (outbox, task) = Outbox::new("/chatter", Arc::new(Prompt), WhenFull::Wait, 1, usize::MAX);

@@ -124,6 +124,10 @@ impl SampleWriter for ZenohPublisher {
         })
     }
 
+    fn is_sending(&self, body: &Bytes) -> bool {
+        self.queue.is_sending(body)
+    }
+
     fn wait_for_acknowledgments(&self, patience: Duration) -> bool {
         self.queue.wait(patience)
     }
@@ -151,10 +155,7 @@ impl InTurn {
         F: FnOnce() -> zenoh::Result<()> + Send + 'static,
     {
         Box::pin(async move {
-            let is_again = lock(&self.0).as_ref().is_some_and(|running| {
-                (running.body.as_ptr(), running.body.len()) == (body.as_ptr(), body.len())
-            });
-            if !is_again {
+            if !self.is_sending(&body) {
                 // The result of the earlier sample is not that of this one.
                 let _ = self.finished().await;
                 let task = smol::unblock(prepare(body.clone()));
@@ -162,6 +163,13 @@ impl InTurn {
             }
             let written = self.finished().await;
             written.map_err(|error| WriteRefusal::Failed(words(error)))
+        })
+    }
+
+    /// True if this body is being sent.
+    pub(super) fn is_sending(&self, body: &Bytes) -> bool {
+        lock(&self.0).as_ref().is_some_and(|running| {
+            (running.body.as_ptr(), running.body.len()) == (body.as_ptr(), body.len())
         })
     }
 
