@@ -285,6 +285,7 @@ def main():
     result |= {"attacks": attacks} if hostile else {}
     result |= {"viewers": seen} if viewers else {}
     print(json.dumps(result))
+    observer.close()
     sys.exit(1 if leaks else 0)
 
 

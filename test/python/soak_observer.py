@@ -63,6 +63,9 @@ class OverDds(Observer):
     def until(self, reached, state):
         self.peer.until(reached, state)
 
+    def close(self):
+        """Nothing: a participant ends with its process."""
+
     def ask(self, name, _request, _response, argument):
         answer = self.calls[name].call(argument)
         assert answer.success, answer.message
@@ -126,6 +129,10 @@ class OverZenoh(Observer):
         padded = answers[0][:ENCAPSULATION] + bytes(HEADER) + answers[0][ENCAPSULATION:]
         answer = response.deserialize(padded)
         assert answer.success, answer.message
+
+    def close(self):
+        """Ends the session, whose threads would go on."""
+        self.peer.session.close()
 
 
 class Router:

@@ -159,7 +159,7 @@ impl ScanMasks {
         mask.is_some_and(|mask| mask.0[place >> 6 & 7] >> (place & 63) & 1 == 1)
     }
 
-    /// As [`ScanMasks::is_hit`], without a look-up for cells in the block of the last one.
+    /// As [`ScanMasks::is_hit`], faster for cells in the block of the last one.
     #[inline(always)]
     pub(super) fn is_hit_from(&self, cell: Packed, cursor: &mut Cursor) -> bool {
         if cell.block() != cursor.block {
