@@ -263,7 +263,7 @@ fn what_a_sweep_hits_it_does_not_clear() {
         options.free_space.sweep_ns = sweep_ns;
         let mut mapper = maps::mapper(options);
         let mut machine = Machine::new();
-        for ahead_m in [3.0, 9.0] {
+        for ahead_m in [3.0, 9.0, 9.0] {
             mapper.on_cloud(&machine.wall(ahead_m)).unwrap();
         }
         mapper.counts().voxels_cleared

@@ -189,7 +189,7 @@ fn the_last_part_of_a_ray_clears_nothing() {
             ..cloud(vec![[0.0; 3]])
         };
         let origin = center - Vector3::x() * 4.0;
-        let report = clear_rays(&mut store, origin, &scan, (keep_m, true));
+        let report = clear_rays(&mut store, origin, &scan, (keep_m, false));
         assert_eq!(report.removed.len(), removed, "{keep_m}");
     }
 }
