@@ -130,15 +130,15 @@ mod tests {
             origin_m: Vector3::zeros(),
             points: 1,
         };
-        let points = vec![[5.0, 0.1, 0.1], [10.0, 0.1, 0.1]];
+        let points = vec![[5.0, 0.1, 0.1], [10.0, 0.1, 0.1], [10.0, 0.1, 0.1]];
         let run = |method| {
-            let scans = [scan, scan];
+            let scans = [scan; 3];
             raycast(method, &lattice, points.clone(), &scans).unwrap()
         };
         let map = run(RaycastMethod::Map);
-        assert_eq!((map.n, map.voxels, map.count), (2, 2, Some(11)));
+        assert_eq!((map.n, map.voxels, map.count), (3, 2, Some(11)));
         let clear = run(RaycastMethod::Clear);
-        assert_eq!((clear.n, clear.voxels, clear.count), (2, 1, Some(1)));
+        assert_eq!((clear.n, clear.voxels, clear.count), (3, 1, Some(1)));
         let evidence = run(RaycastMethod::Evidence);
         assert_eq!((evidence.voxels, evidence.count), (2, Some(0)));
     }
