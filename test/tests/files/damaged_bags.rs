@@ -14,6 +14,8 @@ use lattice_test::random::Random;
 use super::bags::hash;
 
 const MESSAGES: usize = 700;
+/// Damage of a file's magic alone, whose name still names the storage.
+const FIRST_BYTES: &str = "first bytes";
 const START_NS: i64 = 1_700_000_000_000_000_000;
 
 /// Topic, log time, number of bytes and their hash.
@@ -82,7 +84,7 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) -> String {
         }
         _ => {
             fill(0, 8, true);
-            "first bytes".into()
+            FIRST_BYTES.into()
         }
     }
 }
@@ -115,7 +117,7 @@ struct Sums {
     opened: usize,
     lost: u64,
     missing: u64,
-    uncounted: usize,
+    uncounted: Vec<String>,
 }
 
 /// Recovers a bag with each damage, in turn with and without its metadata.
@@ -157,6 +159,7 @@ fn compare(storage: Storage, damages: usize) {
         let sound = found.iter().filter(|m| written.contains(m)).count();
         let shown = format!("{storage:?} {number}: {how}: {sound}, peer {by_peer}, {recovered:?}");
         assert!(sound >= by_peer, "{shown}");
+        assert!(how != FIRST_BYTES || sound == MESSAGES, "{shown}");
         let recovered = recovered.unwrap_or_else(|_| Recovered::default());
         sums.opened += usize::from(recovered.messages > 0);
         assert_eq!(recovered.messages, found.len() as u64, "{shown}");
@@ -182,7 +185,7 @@ fn compare(storage: Storage, damages: usize) {
             sums.lost += lost;
         } else {
             assert!(recovered.damages > 0 || found.is_empty(), "{shown}");
-            sums.uncounted += 1;
+            sums.uncounted.push(how.clone());
         }
         sums.damages += 1;
         sums.recovered += sound;

@@ -43,10 +43,11 @@ mod viewer_writing;
 
 use std::io::{Write, stderr};
 use std::path::PathBuf;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 use serde_json::Value;
+use wait_timeout::ChildExt;
 
 /// Long enough for a loaded machine; a test that passes does not wait for it.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -64,13 +65,29 @@ fn python() -> Option<PathBuf> {
 }
 
 fn lattice(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_lattice"))
-        .args(arguments)
-        // Each replay takes a domain of its own.
-        .env_remove("ROS_DOMAIN_ID")
-        .env("RAYON_NUM_THREADS", "3")
-        .output()
-        .unwrap()
+    command(arguments).output().unwrap()
+}
+
+fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lattice"));
+    // Each replay takes a domain of its own.
+    command.args(arguments).env_remove("ROS_DOMAIN_ID");
+    command.env("RAYON_NUM_THREADS", "3");
+    command
+}
+
+/// Output of a call that must fail, also where it starts a node that would run on.
+fn refused(arguments: &[&str]) -> Output {
+    let mut command = command(arguments);
+    let piped = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = piped.spawn().unwrap();
+    if child.wait_timeout(PATIENCE).unwrap().is_none() {
+        child.kill().unwrap();
+        panic!("{arguments:?} runs on");
+    }
+    let output = child.wait_with_output().unwrap();
+    assert!(!output.status.success(), "{arguments:?} should fail");
+    output
 }
 
 /// Standard output of a call that must succeed.
@@ -87,8 +104,7 @@ fn json(arguments: &[&str]) -> Value {
 
 /// The one line of an error.
 fn error(arguments: &[&str]) -> String {
-    let output = lattice(arguments);
-    assert!(!output.status.success(), "{arguments:?} should fail");
+    let output = refused(arguments);
     assert!(output.stdout.is_empty());
     let text = String::from_utf8(output.stderr).unwrap();
     assert_eq!(text.lines().count(), 1, "{text}");

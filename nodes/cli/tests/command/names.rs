@@ -10,7 +10,7 @@ use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{LoopbackDomain, Runtime};
 
 use crate::record::{PEER, expect, start};
-use crate::{PATIENCE, error, lattice, python};
+use crate::{PATIENCE, error, python, refused};
 
 const PARAMS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../params/bobcat.yaml");
 
@@ -83,8 +83,7 @@ fn values_out_of_range_are_refused_with_their_range() {
             "`max_voxels` of /lattice_mapper = 0 (from the command line): expected 1 or more",
         ),
     ] {
-        let output = lattice(&["node", node, "--ros-args", "-p", wanted]);
-        assert!(!output.status.success(), "{wanted}");
+        let output = refused(&["node", node, "--ros-args", "-p", wanted]);
         // Behind what is said of sockets, if anything is.
         let said = String::from_utf8(output.stderr).unwrap();
         let line = said.lines().last().unwrap();
