@@ -3,11 +3,11 @@
 use rustc_hash::FxHashMap;
 
 use super::masks::ScanMasks;
-use super::packed::{Packed, difference};
+use super::packed::Packed;
 use super::scan::{self, RayBundle, Reach, ScanReport};
 use super::surface::Surfaces;
 use super::traversal::Traversal;
-use crate::lattice::{Lattice, LatticeIndex, MortonKey};
+use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::VoxelStore;
 
 /// Conditions to remove a voxel.
@@ -47,17 +47,27 @@ pub struct ClearReport {
     pub removed: Vec<MortonKey>,
 }
 
+/// Voxels of a store that a marked scan traversed and did not hit.
+pub(super) fn traversed_voxels(masks: &ScanMasks, store: &dyn VoxelStore) -> Vec<Packed> {
+    let mut traversed = Vec::new();
+    for (block, passed, hit) in masks.blocks() {
+        let missed = passed.without(hit);
+        let cells = missed.places().map(|place| Packed::at(block, place));
+        traversed.extend(cells.filter(|cell| store.holds(cell.unpack())));
+    }
+    traversed
+}
+
 /// Clears voxels of a store that rays traverse, for dynamic scenes.
 ///
 /// A voxel is traversed if a ray to the lattice point of a hit cell crosses it more than [`Reach::keep_m`] before the
-/// end. Voxels that the scan hits are kept. With `spare_touching`, a surface at a grazing angle does not clear itself.
-/// Voxels that touch a hit cell in at least a vertex are kept, and voxels that no ray passes through: the surface is the
-/// plane or line of the means of the touching voxels, and the ray goes to the mean of the voxel that it ends in.
+/// end. Voxels that the scan hits are kept. With `spare_touching`, a surface at a grazing angle does not clear itself:
+/// voxels that touch a hit cell in at least a vertex are kept, and voxels whose surface no ray passes through. The surface
+/// is the plane or line of the means of the touching voxels, and a ray goes to the mean of the voxel that it ends in.
 #[derive(Clone, Debug)]
 pub struct RayClearer {
     traversal: Traversal,
     options: ClearOptions,
-    touching: Vec<LatticeIndex>,
     masks: ScanMasks,
     surfaces: Surfaces,
     missed: FxHashMap<MortonKey, u32>,
@@ -69,9 +79,8 @@ impl RayClearer {
         RayClearer {
             traversal: Traversal::new(lattice),
             options,
-            touching: lattice.touching_neighbors().to_vec(),
             masks: ScanMasks::new(options.max_bytes / 2 / ScanMasks::BYTES_PER_BLOCK),
-            surfaces: Surfaces::new(options.max_bytes / 2),
+            surfaces: Surfaces::new(lattice, options.max_bytes / 2),
             missed: FxHashMap::default(),
         }
     }
@@ -94,16 +103,10 @@ impl RayClearer {
         let (masks, traversal) = (&mut self.masks, &self.traversal);
         let (counts, rays) = scan::mark(traversal, masks, &datum_m, scan, reach);
         report.scan = counts;
-        let mut traversed: Vec<Packed> = Vec::new();
-        for (block, passed, hit) in self.masks.blocks() {
-            let missed = passed.without(hit);
-            let cells = missed.places().map(|place| Packed::at(block, place));
-            traversed.extend(cells.filter(|cell| store.holds(cell.unpack())));
-        }
+        let mut traversed = traversed_voxels(&self.masks, store);
         let occupied = traversed.len();
         if self.options.spare_touching {
-            traversed.retain(|cell| !self.touches_hit(*cell));
-            traversed = (self.surfaces).passed_through(store, &self.touching, &rays, traversed);
+            traversed = (self.surfaces).passed_through(store, &self.masks, &rays, traversed);
         }
         report.kept = (occupied - traversed.len()) as u64;
         self.forget_hits(store);
@@ -113,11 +116,6 @@ impl RayClearer {
         keys.retain(|key| self.is_enough(*key) && store.remove(*key));
         report.removed = keys;
         report
-    }
-
-    fn touches_hit(&self, cell: Packed) -> bool {
-        let mut around = self.touching.iter().map(|n| cell.plus(difference(*n)));
-        around.any(|cell| self.masks.is_hit(cell))
     }
 
     /// Counts a miss; true if the voxel is to be removed.

@@ -19,6 +19,8 @@ pub struct FreeSpaceOptions {
     pub evidence: Evidence,
     /// Range of the rays.
     pub reach: Reach,
+    /// Counts no miss of voxels that the scan grazes, where the scan is held against a store of voxels.
+    pub spare_touching: bool,
     /// Level of the free cells, `2^free_level` as wide, at most [`MAX_FREE_LEVEL`]; `None` keeps only cells that were
     /// hit.
     pub free_level: Option<u32>,
@@ -32,6 +34,7 @@ impl Default for FreeSpaceOptions {
         FreeSpaceOptions {
             evidence: Evidence::default(),
             reach: Reach::default(),
+            spare_touching: true,
             free_level: Some(0),
             max_bytes: 1 << 30,
         }

@@ -3,13 +3,14 @@
 use nalgebra::Vector3;
 
 use super::blocks::{Blocks, add_evidence, apply_to_hit};
-use super::clear::ClearReport;
+use super::clear::{ClearReport, traversed_voxels};
 use super::coarse::Coarse;
 use super::evidence::{Evidence, Steps, UNKNOWN};
 use super::free_space_options::{FreeSpaceError, FreeSpaceOptions};
 use super::masks::{Cursor, Mask, ScanMasks};
 use super::packed::Packed;
 use super::scan::{self, RayBundle, Reach, ScanReport};
+use super::surface::Surfaces;
 use super::traversal::Traversal;
 use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::{DatumError, VoxelStore};
@@ -52,6 +53,7 @@ pub struct FreeSpaceMap {
     options: FreeSpaceOptions,
     steps: Steps,
     masks: ScanMasks,
+    surfaces: Surfaces,
     cells: Blocks,
     free: Free,
 }
@@ -79,7 +81,7 @@ impl FreeSpaceMap {
         let [x, y, z] = datum_near_m.into();
         let index = lattice.quantize_wide(&datum_near_m);
         let datum_index = index.ok_or(DatumError { x, y, z })?;
-        // A quarter of the memory is for the masks of one scan; with a free level, half of it is for the coarse
+        // A quarter of the memory is for the masks of one scan, an eighth for those of the voxels that it traverses; with a free level, half of it is for the coarse
         // lattice.
         let share = match options.free_level {
             None | Some(0) => options.max_bytes,
@@ -98,7 +100,8 @@ impl FreeSpaceMap {
             options,
             steps,
             masks: ScanMasks::new(share / 4 / ScanMasks::BYTES_PER_BLOCK),
-            cells: Blocks::new(share / 4 * 3 / Blocks::BYTES_PER_BLOCK),
+            surfaces: Surfaces::new(&lattice, share / 8),
+            cells: Blocks::new(share / 8 * 5 / Blocks::BYTES_PER_BLOCK),
             free,
         })
     }
@@ -108,20 +111,39 @@ impl FreeSpaceMap {
     /// The result does not depend on the order of the points of a bundle. Points that are not finite or out of range
     /// are counted and dropped; if the origin is, the whole bundle.
     pub fn insert_scan(&mut self, scan: &[RayBundle]) -> ScanReport {
-        let (mut report, _) = scan::mark(
+        self.add(scan, None).scan
+    }
+
+    /// Adds a scan. Voxels of `store` that it grazes get no miss; they are counted in `kept`.
+    fn add(&mut self, scan: &[RayBundle], store: Option<&dyn VoxelStore>) -> ClearReport {
+        let (mut report, rays) = scan::mark(
             &self.traversal,
             &mut self.masks,
             &self.datum_m,
             scan,
             self.options.reach,
         );
+        let mut kept = 0;
+        if let Some(store) = store {
+            let traversed = traversed_voxels(&self.masks, store);
+            kept = traversed.len();
+            traversed.iter().for_each(|cell| self.masks.spare(*cell));
+            let passed = (self.surfaces).passed_through(store, &self.masks, &rays, traversed);
+            kept -= passed.len();
+            let mut cursor = Cursor::NONE;
+            (passed.into_iter()).for_each(|cell| self.masks.pass(cell, &mut cursor));
+        }
         let missed = |(_, passed, hit): (u64, &Mask, &Mask)| -> u64 {
             let words = passed.without(hit).0;
             words.iter().map(|word| u64::from(word.count_ones())).sum()
         };
         report.misses = self.masks.blocks().map(missed).sum();
         report.blocks_refused = self.apply_marks();
-        report
+        ClearReport {
+            scan: report,
+            kept: kept as u64,
+            ..ClearReport::default()
+        }
     }
 
     /// Adds the masks of a scan; returns the number of refused blocks.
@@ -141,13 +163,14 @@ impl FreeSpaceMap {
     /// Adds a scan whose points are already in `store`, and removes from it the hit or traversed voxels that are not
     /// occupied by the evidence.
     ///
+    /// With `spare_touching`, voxels that the scan grazes get no miss, see [`super::RayClearer`].
     /// A store of another lattice or datum is not changed.
     pub fn clear(&mut self, store: &mut dyn VoxelStore, scan: &[RayBundle]) -> ClearReport {
-        let mut report = ClearReport::default();
         if store.lattice() != self.lattice() || store.datum_index() != self.datum_index {
-            return report;
+            return ClearReport::default();
         }
-        report.scan = self.insert_scan(scan);
+        let grazed = self.options.spare_touching.then_some(&*store);
+        let mut report = self.add(scan, grazed);
         let is_free = |value: i8| value != UNKNOWN && value < self.steps.threshold;
         for (block, passed, hit) in self.masks.blocks() {
             let Some(cells) = self.cells.block(block) else {
@@ -186,10 +209,17 @@ impl FreeSpaceMap {
         }
     }
 
-    /// Sets another sensor model and range; cells keep their evidence.
-    pub fn set_weights(&mut self, evidence: Evidence, reach: Reach) -> Result<(), FreeSpaceError> {
+    /// Sets another sensor model, range and rule of grazed voxels; cells keep their evidence.
+    pub fn set_weights(
+        &mut self,
+        evidence: Evidence,
+        reach: Reach,
+        spare_touching: bool,
+    ) -> Result<(), FreeSpaceError> {
         self.steps = Steps::new(&evidence)?;
-        (self.options.evidence, self.options.reach) = (evidence, reach);
+        let options = &mut self.options;
+        (options.evidence, options.reach) = (evidence, reach);
+        options.spare_touching = spare_touching;
         Ok(())
     }
 
@@ -244,6 +274,6 @@ impl FreeSpaceMap {
             Free::Hit | Free::Fine => 0,
             Free::Coarse(coarse) => coarse.bytes(),
         };
-        self.cells.bytes() + self.masks.bytes() + coarse
+        self.cells.bytes() + self.masks.bytes() + self.surfaces.bytes() + coarse
     }
 }

@@ -20,6 +20,10 @@ impl Mask {
         new
     }
 
+    fn remove(&mut self, place: usize) {
+        self.0[place >> 6 & 7] &= !(1 << (place & 63));
+    }
+
     /// Cells that are not in another mask.
     pub(super) fn without(&self, other: &Mask) -> Mask {
         Mask(std::array::from_fn(|word| self.0[word] & !other.0[word]))
@@ -140,6 +144,14 @@ impl ScanMasks {
         }
         if let Some(mask) = self.passed.get_mut(cursor.slot) {
             mask.set(cell.place());
+        }
+    }
+
+    /// Takes the mark of a traversed cell back.
+    pub(super) fn spare(&mut self, cell: Packed) {
+        let mask = self.find(cell.block()).filter(|slot| *slot != 0);
+        if let Some(mask) = mask.and_then(|slot| self.passed.get_mut(slot)) {
+            mask.remove(cell.place());
         }
     }
 

@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rustc_hash::FxHashMap;
 
 use super::masks::{Cursor, ScanMasks};
-use super::packed::Packed;
+use super::packed::{Packed, difference};
 use super::scan::{Line, MarkedRays};
-use crate::lattice::{LatticeIndex, MortonKey};
+use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
 
 // Lengths in cell sizes (cube root of the cell volume), chosen on eight scans of KITTI 00 and one seed of the simulated
@@ -30,33 +30,47 @@ const LEVEL: f64 = 0.02;
 const FLAT: f64 = 0.7;
 
 /// Test of traversed voxels against the rays of a scan.
+///
+/// A scan grazes a voxel that touches a hit cell in at least a vertex, and one whose surface no ray passes through: the
+/// surface is the plane or line of the means of the touching voxels, and a ray goes to the mean of the voxel that it
+/// ends in.
 #[derive(Clone, Debug)]
 pub(super) struct Surfaces {
+    touching: Vec<LatticeIndex>,
     /// The voxels, as hit cells.
     voxels: ScanMasks,
 }
 
 impl Surfaces {
     /// Creates a test within a limit of memory, bytes; voxels beyond it are not passed through.
-    pub(super) fn new(max_bytes: usize) -> Surfaces {
+    pub(super) fn new(lattice: &Lattice, max_bytes: usize) -> Surfaces {
         Surfaces {
+            touching: lattice.touching_neighbors().to_vec(),
             voxels: ScanMasks::new(max_bytes / ScanMasks::BYTES_PER_BLOCK),
         }
     }
 
-    /// Voxels, of the traversed ones, whose surface a ray passes through; in no order.
+    pub(super) fn bytes(&self) -> usize {
+        self.voxels.bytes()
+    }
+
+    /// Voxels, of the traversed ones, that the scan does not graze; in no order.
     pub(super) fn passed_through(
         &mut self,
         store: &dyn VoxelStore,
-        touching: &[LatticeIndex],
+        masks: &ScanMasks,
         rays: &MarkedRays,
-        traversed: Vec<Packed>,
+        mut traversed: Vec<Packed>,
     ) -> Vec<Packed> {
+        traversed.retain(|cell| {
+            let mut around = (self.touching.iter()).map(|n| cell.plus(difference(*n)));
+            !around.any(|cell| masks.is_hit(cell))
+        });
         let datum_m = store.datum_m();
         let (mut surfaces, mut cursor) = (FxHashMap::default(), Cursor::NONE);
         self.voxels.clear();
         for cell in traversed {
-            if let Some(surface) = Surface::about(store, touching, cell.unpack()) {
+            if let Some(surface) = Surface::about(store, &self.touching, cell.unpack()) {
                 surfaces.insert(cell, (surface, false));
                 self.voxels.hit(cell, &mut cursor);
             }

@@ -57,6 +57,7 @@ impl FreeSpace {
                 let options = FreeSpaceOptions {
                     evidence: options.evidence,
                     reach: options.clear.reach,
+                    spare_touching: options.clear.spare_touching,
                     free_level: Some(options.free_level).filter(|level| *level > 0),
                     max_bytes: options.clear.max_bytes,
                 };
@@ -79,7 +80,9 @@ impl FreeSpace {
             Method::Clear(clearer) => clearer.set_options(options.clear),
             Method::Evidence(map) => {
                 // Validated when the parameters were read.
-                if let Err(error) = map.set_weights(options.evidence, options.clear.reach) {
+                let clear = options.clear;
+                let set = map.set_weights(options.evidence, clear.reach, clear.spare_touching);
+                if let Err(error) = set {
                     log::error!("{error}");
                 }
             }
