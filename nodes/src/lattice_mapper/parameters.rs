@@ -24,9 +24,9 @@ const ABOUT: &[About] = about! {
     "rays.sweep_s": "Duration of the clouds of one scan; 0: each cloud is a scan. Cells hit by any of them are not cleared by the others. A laser on a turntable needs one revolution.";
     "rays.max_range_m": "Length limit of rays; 0: no limit.";
     "rays.misses": "Consecutive scans that must miss a voxel before it is cleared (clear).";
-    "rays.keep_m": "Length of the end of each ray that clears nothing; this or keep_ratio, whichever is longer. With evidence, ground at a flat angle needs the cell size over the height of the sensor.";
+    "rays.keep_m": "Length of the end of each ray that clears nothing; this or keep_ratio, whichever is longer. For poses that are worse than a cell.";
     "rays.keep_ratio": "Length of that end as a fraction of the ray.";
-    "rays.spare_touching": "Whether voxels that the scan grazes are kept: those that touch a hit cell, and those whose surface no ray passes through (clear).";
+    "rays.spare_touching": "Whether voxels that the scan grazes are kept: those that touch a hit cell, and those whose surface no ray passes through.";
     "rays.max_bytes" fixed(MAP): "Memory limit for rays and evidence, bytes.";
     "evidence.hit": "Probability that a cell is occupied after one hit.";
     "evidence.miss": "Probability that a cell is occupied after one miss.";

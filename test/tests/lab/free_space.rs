@@ -3,7 +3,9 @@
 use lattice_bag::{BagReader, Storage};
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
-use lattice_core::raycast::{ClearOptions, RayBundle, RayClearer, Reach};
+use lattice_core::raycast::{
+    ClearOptions, FreeSpaceMap, FreeSpaceOptions, RayBundle, RayClearer,
+};
 use lattice_core::voxels::{VoxelList, VoxelStore};
 use lattice_lab::datasets::{BobcatOptions, write_bobcat};
 use lattice_lab::simulate::drive::Drive;
@@ -33,6 +35,7 @@ const EVIDENCE: &[&str] = &[
     "free_space:=evidence",
     "rays.sweep_s:=2.0",
     "rays.keep_ratio:=0.2",
+    "rays.spare_touching:=false",
     "evidence.threshold:=0.3",
 ];
 
@@ -143,12 +146,28 @@ fn cloud(points_m: &[Vector3<f64>]) -> Cloud {
     Cloud::from_points(0, Vector3::zeros(), points_m)
 }
 
-/// Voxels of all scans, and those that are left where rays clear.
-fn cleared(scans: &[Scan], cell_volume_m3: f64, options: ClearOptions) -> [VoxelList; 2] {
+/// Rule by which the voxels along the rays of a scan are removed.
+#[derive(Clone, Copy)]
+enum Rule {
+    Clear(ClearOptions),
+    Evidence(FreeSpaceOptions),
+}
+
+/// Voxels of all scans, and those that are left by a rule.
+fn cleared(scans: &[Scan], cell_volume_m3: f64, rule: Rule) -> [VoxelList; 2] {
     let lattice = Lattice::new(LatticeKind::Fcc, cell_volume_m3).unwrap();
     let [mut all, mut left] =
         [0; 2].map(|_| VoxelList::new(lattice.clone(), Vector3::zeros(), usize::MAX).unwrap());
-    let mut clearer = RayClearer::new(&lattice, options);
+    let mut clear: Box<dyn FnMut(&mut VoxelList, &[RayBundle])> = match rule {
+        Rule::Clear(options) => {
+            let mut clearer = RayClearer::new(&lattice, options);
+            Box::new(move |store, scan| drop(clearer.clear(store, scan)))
+        }
+        Rule::Evidence(options) => {
+            let mut map = FreeSpaceMap::new(lattice, Vector3::zeros(), options).unwrap();
+            Box::new(move |store, scan| drop(map.clear(store, scan)))
+        }
+    };
     for scan in scans {
         let clouds: Vec<(Vector3<f64>, Cloud)> = scan
             .iter()
@@ -164,7 +183,7 @@ fn cleared(scans: &[Scan], cell_volume_m3: f64, options: ClearOptions) -> [Voxel
                 ends,
             })
             .collect();
-        clearer.clear(&mut left, &bundles);
+        clear(&mut left, &bundles);
     }
     [all, left]
 }
@@ -182,24 +201,23 @@ fn scans_of_cells(scans: &[Scan], store: &dyn VoxelStore) -> BTreeMap<MortonKey,
     counts
 }
 
-/// Options and their names: the defaults, and rays that clear whatever they cross.
-fn rules() -> [(&'static str, ClearOptions); 3] {
+const CROSSED: &str = "all that is crossed";
+
+/// Rules and their names: the defaults of both methods, and rays that clear whatever they cross.
+fn rules() -> [(&'static str, Rule); 3] {
+    let evidence = FreeSpaceOptions {
+        free_level: None,
+        ..FreeSpaceOptions::default()
+    };
     let crossing = ClearOptions {
         misses: 1,
         spare_touching: false,
         ..ClearOptions::default()
     };
-    let shortened = ClearOptions {
-        reach: Reach {
-            keep_ratio: 0.3,
-            ..Reach::default()
-        },
-        ..crossing
-    };
     [
-        ("default", ClearOptions::default()),
-        ("keep_ratio 0.3", shortened),
-        ("all that is crossed", crossing),
+        ("clear", Rule::Clear(ClearOptions::default())),
+        ("evidence", Rule::Evidence(evidence)),
+        (CROSSED, Rule::Clear(crossing)),
     ]
 }
 
@@ -212,8 +230,12 @@ fn percent(part: usize, all: usize) -> f64 {
 fn passers_go_from_the_map_of_a_town_and_the_town_stays() {
     for (seed, cell_volume_m3) in [(1, 0.125), (2, 0.125), (1, 0.008)] {
         let [passers, still] = Drive::passers(seed).map(|drive| driven(&drive));
-        for (name, options) in rules() {
-            let [all, left] = cleared(&passers, cell_volume_m3, options);
+        for (name, rule) in rules() {
+            // About the half everywhere.
+            if name == CROSSED && (seed, cell_volume_m3) != (1, 0.125) {
+                continue;
+            }
+            let [all, left] = cleared(&passers, cell_volume_m3, rule);
             let fixed = scans_of_cells(&still, &all);
             let seen_twice: Vec<_> = fixed.iter().filter(|(_, scans)| **scans > 1).collect();
             let lost = seen_twice
@@ -234,7 +256,7 @@ fn passers_go_from_the_map_of_a_town_and_the_town_stays() {
                 passed.len()
             );
             assert!(seen_twice.len() > 20_000 && passed.len() > 1000);
-            assert!(name != "default" || (lost < 2.0 && removed > 85.0));
+            assert!(name == CROSSED || (lost < 2.0 && removed > 80.0));
         }
     }
 }
@@ -247,20 +269,15 @@ fn a_street_stays_in_the_map_of_kitti() {
     };
     for volume in ["cell_volume_m3:=0.125", "cell_volume_m3:=0.008"] {
         let clear = [volume, "free_space:=clear"];
-        let crossed = [
-            &clear[..],
-            &["rays.misses:=1", "rays.spare_touching:=false"],
-        ]
-        .concat();
-        let shortened = [&crossed[..], &["rays.keep_ratio:=0.3"]].concat();
         let evidence = [volume, "free_space:=evidence"];
-        let maps = maps(&bag, &[&[volume], &clear, &shortened, &crossed, &evidence]);
+        let crossed = [&evidence[..], &["rays.spare_touching:=false"]].concat();
+        let maps = maps(&bag, &[&[volume], &clear, &evidence, &crossed]);
         let (all, cleared) = maps.split_first().unwrap();
         let lost: Vec<f64> = cleared
             .iter()
             .map(|left| percent(all.len() - left.len(), all.len()))
             .collect();
         println!("kitti, {volume}: of {} lost {lost:.2?} %", all.len());
-        assert!(all.len() > 20_000 && lost[0] < 1.0 && lost[2] > 5.0);
+        assert!(all.len() > 20_000 && lost[0] < 1.0 && lost[1] < 0.5 && lost[2] > 5.0);
     }
 }

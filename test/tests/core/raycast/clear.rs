@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
 use lattice_core::raycast::{
-    ClearOptions, ClearReport, Evidence, FreeSpaceOptions, RayBundle, RayClearer, Reach,
+    ClearOptions, ClearReport, Evidence, FreeSpaceMap, FreeSpaceOptions, RayBundle, RayClearer,
+    Reach,
 };
 use lattice_core::voxels::{OccupancyList, VoxelList, VoxelStore};
 use nalgebra::Vector3;
@@ -116,6 +117,31 @@ proptest! {
         prop_assert_eq!((report.missed + report.kept) as usize, expected.len());
         scan.reverse();
         prop_assert_eq!(report, clear_rays(&mut again, origin_m, &cloud(scan), (0.0, true)));
+    }
+
+    /// Evidence of one hit, which one miss outweighs, removes what clearing removes.
+    #[test]
+    fn evidence_counts_no_miss_of_what_clearing_spares(
+        kind in any_kind(),
+        spare_touching in any::<bool>(),
+        (stored, scan) in (any_points(800), any_points(40)),
+    ) {
+        let [mut by_rays, mut by_evidence] = [0; 2].map(|_| list(kind, &stored));
+        let options = FreeSpaceOptions {
+            evidence: Evidence { miss: 0.25, ..Evidence::default() },
+            spare_touching,
+            free_level: None,
+            ..FreeSpaceOptions::default()
+        };
+        let (lattice, datum_m) = (by_evidence.lattice().clone(), by_evidence.datum_m());
+        let mut map = FreeSpaceMap::new(lattice, datum_m, options).unwrap();
+        map.insert_occupied(&by_evidence.sorted_keys());
+        let (origin_m, ends) = (at([0.1013, 0.0207, 0.1991]), cloud(scan));
+        let cleared = clear_rays(&mut by_rays, origin_m, &ends, (0.0, spare_touching));
+        let counted = map.clear(&mut by_evidence, &[bundle(origin_m, &ends)]);
+        prop_assert_eq!(counted.removed, cleared.removed);
+        prop_assert_eq!((counted.missed, counted.kept), (cleared.missed, cleared.kept));
+        prop_assert_eq!(by_evidence.sorted_keys(), by_rays.sorted_keys());
     }
 }
 
