@@ -51,6 +51,22 @@ impl<E> Clone for Inbox<E> {
     }
 }
 
+/// Request to a compute thread to leave out work, since its node has to end.
+#[derive(Clone, Debug, Default)]
+pub struct Hurry(Arc<AtomicBool>);
+
+impl Hurry {
+    /// True after the request.
+    pub fn is_requested(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    /// Requests it.
+    pub fn request(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 impl<E: Send + 'static> Compute<E> {
     /// Starts the thread. The handler runs inside the pool, one event at a time, in order; a
     /// panic requests shutdown of the process.

@@ -12,7 +12,7 @@ use lattice_runtime::{
     Losses, Node, Publisher, RuntimeError, Subscription, SubscriptionExecutor, Undecoded,
 };
 
-use crate::compute::Inbox;
+use crate::compute::{Hurry, Inbox};
 use crate::map_follower::{FollowError, Followed};
 
 /// Counters of messages lost before the compute thread.
@@ -92,9 +92,12 @@ impl MapLosses {
     }
 }
 
-/// Keyframe requests of a map follower to its mapper, and warnings in the log.
+/// Map of a node: its chunks, keyframe requests to the mapper, and warnings in the log.
 pub struct MapRequests {
     losses: MapLosses,
+    hurry: Hurry,
+    /// True after a keyframe chunk was left out.
+    left_out: bool,
     /// Losses up to the last keyframe request.
     seen: u64,
     request: Publisher<Empty>,
@@ -103,11 +106,18 @@ pub struct MapRequests {
 }
 
 impl MapRequests {
-    /// Creates requests to the mapper of this name.
-    pub fn new(node: &Node, mapper: &str, losses: &MapLosses) -> Result<Self, RuntimeError> {
+    /// Creates requests to the mapper of this name; after `hurry` keyframes are left out.
+    pub fn new(
+        node: &Node,
+        mapper: &str,
+        losses: &MapLosses,
+        hurry: &Hurry,
+    ) -> Result<Self, RuntimeError> {
         let topic = format!("{mapper}/request_keyframe");
         Ok(Self {
             losses: losses.clone(),
+            hurry: hurry.clone(),
+            left_out: false,
             seen: 0,
             request: node.publisher(&topic, Qos::DEFAULT)?,
             refusals: Throttle::new(Duration::from_secs(5)),
@@ -115,8 +125,32 @@ impl MapRequests {
         })
     }
 
-    /// Handles the outcome of a chunk.
-    pub fn followed(&self, result: Option<Result<Followed, FollowError>>) {
+    /// Decodes a keyframe chunk and passes it to the follower, unless the node has to end: then the keyframe would often
+    /// not be complete in time.
+    pub fn map(
+        &mut self,
+        chunk: Undecoded<LatticeMap>,
+        follow: impl FnOnce(&LatticeMap) -> Result<Followed, FollowError>,
+    ) {
+        if self.hurry.is_requested() {
+            if !std::mem::replace(&mut self.left_out, true) {
+                log::warn!("the node ends before it has read all of the map that it received");
+            }
+            return;
+        }
+        self.followed(chunk.decode().map(|chunk| follow(&chunk)));
+    }
+
+    /// Decodes an update chunk and passes it to the follower.
+    pub fn update(
+        &self,
+        chunk: Undecoded<LatticeMapUpdate>,
+        follow: impl FnOnce(&LatticeMapUpdate) -> Result<Followed, FollowError>,
+    ) {
+        self.followed(chunk.decode().map(|chunk| follow(&chunk)));
+    }
+
+    fn followed(&self, result: Option<Result<Followed, FollowError>>) {
         match result {
             Some(Ok(Followed::NeedKeyframe)) => self.ask_for_keyframe(),
             Some(Err(error)) => {

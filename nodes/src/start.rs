@@ -7,6 +7,9 @@ use std::time::Duration;
 use lattice_runtime::Runtime;
 use lattice_runtime::params::{ParamError, Params};
 
+/// Time of an ending node for the messages that it has received; then keyframes among them are left out. With [`LAST_FLUSH`]
+/// a process ends within 2 s of a signal.
+pub const LAST_EVENTS: Duration = Duration::from_millis(500);
 /// Longest wait of an ending node for the acknowledgements of its last messages: a process ends within 2 s of a signal.
 pub const LAST_FLUSH: Duration = Duration::from_millis(500);
 

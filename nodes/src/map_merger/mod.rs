@@ -23,6 +23,9 @@ pub use robot_map::{Refusal, RobotMap};
 use crate::convert::{geometry, map};
 use crate::map_follower::{FollowError, Followed, MapFollower};
 
+/// Cells summed between two looks at the time: some milliseconds.
+const CELLS_BETWEEN_LOOKS: usize = 4096;
+
 /// Options of a merger.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MergerOptions {
@@ -74,6 +77,8 @@ pub struct MergerCounts {
 pub struct MapMerger {
     options: MergerOptions,
     robot_maps: Vec<RobotMap>,
+    /// Changed cells that are not summed yet, in ascending order.
+    waiting: Vec<MortonKey>,
     /// `None` before the first robot's map.
     union: Option<VoxelList>,
     origin: Option<GeoPoint>,
@@ -90,6 +95,7 @@ impl MapMerger {
         Self {
             robot_maps: (0..options.robots.len()).map(robot_map).collect(),
             options,
+            waiting: Vec::new(),
             union: None,
             origin: None,
             epoch,
@@ -147,10 +153,15 @@ impl MapMerger {
 
     /// Changes of all robots since the last call, as one update.
     pub fn take_update(&mut self) -> Vec<LatticeMapUpdate> {
+        self.take_update_until(&|| false)
+    }
+
+    /// As [`MapMerger::take_update`]; cells that are not summed when `is_over` becomes true wait for the next one.
+    pub fn take_update_until(&mut self, is_over: &dyn Fn() -> bool) -> Vec<LatticeMapUpdate> {
         for robot in 0..self.robot_maps.len() {
             self.admit(robot);
         }
-        self.sum_up();
+        self.sum_up(is_over);
         let Some(union) = &mut self.union else {
             return Vec::new();
         };
@@ -210,19 +221,24 @@ impl MapMerger {
         }
     }
 
-    /// Sums the cells that changed in any map.
-    fn sum_up(&mut self) {
+    /// Sums the cells that changed in any map, until `is_over`.
+    fn sum_up(&mut self, is_over: &dyn Fn() -> bool) {
         let Some(union) = &mut self.union else {
             return;
         };
-        let mut cells: Vec<MortonKey> = Vec::new();
+        let mut cells = std::mem::take(&mut self.waiting);
         for robot_map in &mut self.robot_maps {
             self.counts.voxels_out_of_range += robot_map.take_changed(&mut cells);
         }
         cells.sort_unstable();
         cells.dedup();
         let mut labels = BTreeMap::new();
-        for cell in cells {
+        let mut summed = cells.len();
+        for (at, &cell) in cells.iter().enumerate() {
+            if at % CELLS_BETWEEN_LOOKS == 0 && is_over() {
+                summed = at;
+                break;
+            }
             labels.clear();
             let mut sum = Voxel::default();
             for (robot, robot_map) in (0..).zip(&self.robot_maps) {
@@ -239,6 +255,12 @@ impl MapMerger {
                 self.counts.voxels_list_full += 1;
             }
         }
+        self.waiting = cells.split_off(summed);
+    }
+
+    /// Number of changed cells that are not summed yet.
+    pub fn waiting(&self) -> usize {
+        self.waiting.len()
     }
 
     /// Voxels of the merged map, `None` before the first robot's map.

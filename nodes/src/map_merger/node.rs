@@ -12,13 +12,12 @@ use serde::Serialize;
 
 use super::parameters::Settings;
 use super::{MapMerger, MergedLabels, MergerCounts, MergerOptions};
-use crate::compute::Compute;
+use crate::compute::{Compute, Hurry};
 use crate::convert::geometry;
-use crate::map_follower::{FollowError, Followed};
 use crate::map_input::{MapLosses, MapRequests};
 use crate::map_output::{MapOutput, epoch};
 use crate::report;
-use crate::start::{Finish, NodeError, handed_over, open_params};
+use crate::start::{Finish, LAST_EVENTS, NodeError, handed_over, open_params};
 
 /// Event for the compute thread.
 enum Event {
@@ -36,6 +35,8 @@ struct MergerReport<'a> {
     counts: &'a MergerCounts,
     voxels: usize,
     robots: Vec<(&'a str, usize)>,
+    /// Changed voxels of robots that the merged map lacks.
+    voxels_not_merged: usize,
     /// Lost messages per robot.
     #[serde(flatten)]
     losses: BTreeMap<String, u64>,
@@ -55,9 +56,10 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         MergedLabels::Own | MergedLabels::None => None,
     };
     let losses: Vec<MapLosses> = robots.iter().map(|_| MapLosses::default()).collect();
+    let hurry = Hurry::default();
     let input = |(robot, losses): (&String, &MapLosses)| {
         let mapper = format!("/{robot}/{}", settings.mapper);
-        MapRequests::new(&node, &mapper, losses)
+        MapRequests::new(&node, &mapper, losses, &hurry)
     };
     let mut compute_state = ComputeState {
         inputs: robots
@@ -65,6 +67,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             .zip(&losses)
             .map(input)
             .collect::<Result<_, _>>()?,
+        hurry: hurry.clone(),
         machine: MapMerger::new(settings.merger, epoch()),
         robots: robots.clone(),
         output,
@@ -101,7 +104,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     });
     Ok(Box::new(move || {
         drop(subscriptions);
-        compute.finish_with(Event::Finish);
+        compute.finish_within(Event::Finish, LAST_EVENTS, || hurry.request());
         Box::new((requests, label_info))
     }))
 }
@@ -126,6 +129,7 @@ fn names(node: &Node, options: &MergerOptions) -> Result<Publisher<LabelInfo>, N
 /// State of the compute thread.
 struct ComputeState {
     inputs: Vec<MapRequests>,
+    hurry: Hurry,
     machine: MapMerger,
     robots: Vec<String>,
     output: MapOutput,
@@ -138,24 +142,18 @@ impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Map(robot, chunk) => {
-                let result = chunk.decode();
-                let result = result.map(|chunk| self.machine.on_map(robot, &chunk));
-                self.followed(robot, result);
+                if let Some(input) = self.inputs.get_mut(robot) {
+                    input.map(chunk, |chunk| self.machine.on_map(robot, chunk));
+                }
             }
             Event::Update(robot, chunk) => {
-                let result = chunk.decode();
-                let result = result.map(|chunk| self.machine.on_update(robot, &chunk));
-                self.followed(robot, result);
+                if let Some(input) = self.inputs.get(robot) {
+                    input.update(chunk, |chunk| self.machine.on_update(robot, chunk));
+                }
             }
             Event::Publish => self.publish(),
             Event::Settings(options) => self.machine.set_options(options),
             Event::Finish => self.finish(),
-        }
-    }
-
-    fn followed(&self, robot: usize, result: Option<Result<Followed, FollowError>>) {
-        if let Some(input) = self.inputs.get(robot) {
-            input.followed(result);
         }
     }
 
@@ -168,10 +166,15 @@ impl ComputeState {
                 }
             }
         }
-        let update = self.machine.take_update();
+        let hurry = &self.hurry;
+        let update = self.machine.take_update_until(&|| hurry.is_requested());
         // Before the first robot there is no map to publish.
         if self.machine.list().is_some() {
-            self.output.publish(update, || self.machine.keyframe());
+            let keyframe = || match hurry.is_requested() {
+                true => Vec::new(),
+                false => self.machine.keyframe(),
+            };
+            self.output.publish(update, keyframe);
         }
         self.diagnose();
     }
@@ -229,9 +232,16 @@ impl ComputeState {
     fn finish(&mut self) {
         self.publish();
         let mut left = usize::MAX;
-        while self.output.pending() > 0 && self.output.pending() < left {
+        while self.output.pending() > 0
+            && self.output.pending() < left
+            && !self.hurry.is_requested()
+        {
             left = self.output.pending();
             self.publish();
+        }
+        let voxels_not_merged = self.machine.waiting();
+        if voxels_not_merged > 0 {
+            log::warn!("the node ends before it has merged {voxels_not_merged} voxels");
         }
         self.output.flush();
         let robot_maps = self.robots.iter().zip(self.machine.robot_maps());
@@ -241,6 +251,7 @@ impl ComputeState {
             robots: robot_maps
                 .map(|(robot, robot_map)| (robot.as_str(), robot_map.voxels()))
                 .collect(),
+            voxels_not_merged,
             losses: self.losses(),
             updates_not_published: self.output.updates_lost(),
             chunks_not_published: self.output.chunks_lost(),

@@ -11,10 +11,10 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use super::parameters::Settings;
 use super::robot::RobotPosition;
 use super::{MapProjector, MapProjectorOptions, Projected, ProjectorReport};
-use crate::compute::{Compute, Inbox};
+use crate::compute::{Compute, Hurry, Inbox};
 use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
-use crate::start::{Finish, LAST_FLUSH, NodeError, handed_over, open_params};
+use crate::start::{Finish, LAST_EVENTS, LAST_FLUSH, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
@@ -48,8 +48,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         grid: node.publisher("projected_map", Qos::LATCHED)?,
         updates: node.publisher("projected_map_updates", Qos::DEFAULT)?,
     };
-    let losses = MapLosses::default();
-    let requests = MapRequests::new(&node, &settings.mapper, &losses)?;
+    let (losses, hurry) = (MapLosses::default(), Hurry::default());
+    let requests = MapRequests::new(&node, &settings.mapper, &losses, &hurry)?;
     let mut state = ComputeState {
         requests,
         robot: RobotPosition::new(settings.base_frame),
@@ -95,7 +95,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         Ok(())
     });
     Ok(Box::new(move || {
-        compute.finish_with(Event::Finish);
+        compute.finish_within(Event::Finish, LAST_EVENTS, || hurry.request());
         Box::new(())
     }))
 }
@@ -177,12 +177,11 @@ impl ComputeState {
         match event {
             Event::Inputs(inputs) => self.inputs = Some(*inputs),
             Event::Map(chunk) => {
-                let result = chunk.decode().map(|chunk| self.machine.on_map(&chunk));
-                self.requests.followed(result);
+                self.requests.map(chunk, |chunk| self.machine.on_map(chunk));
             }
             Event::Update(chunk) => {
-                let result = chunk.decode().map(|chunk| self.machine.on_update(&chunk));
-                self.requests.followed(result);
+                self.requests
+                    .update(chunk, |chunk| self.machine.on_update(chunk));
             }
             Event::Free(chunk) => {
                 // Free cells are published anew by themselves.

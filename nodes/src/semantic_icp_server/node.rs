@@ -19,10 +19,10 @@ use super::outputs::Outputs;
 use super::parameters::Settings;
 use super::search_thread::{SearchPort, SearchThread};
 use super::{CallId, End, LatticeSearch, Output, SemanticIcpServer, ServerOptions, ServerReport};
-use crate::compute::{Compute, Inbox};
+use crate::compute::{Compute, Hurry, Inbox};
 use crate::convert::cloud;
 use crate::report;
-use crate::start::{Finish, NodeError, handed_over, open_params};
+use crate::start::{Finish, LAST_EVENTS, NodeError, handed_over, open_params};
 use lattice_runtime::SubscriptionExecutor::{Dedicated, Shared};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
@@ -69,9 +69,11 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let lost = Arc::new(AtomicU64::new(0));
     let map_lost = Arc::new(AtomicBool::new(false));
     let losses = Losses::default();
+    let hurry = Hurry::default();
     let guard = TfGuard::new(|_, _| "another headset_frame".to_owned());
     let mut compute_state = ComputeState {
         losses: losses.clone(),
+        hurry: hurry.clone(),
         machine: SemanticIcpServer::new(server),
         search: None,
         outputs: Outputs::open(&node, &mapper, &guard)?,
@@ -166,7 +168,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     });
     Ok(Box::new(move || {
         drop((maps, updates, transforms, clouds, sessions, infos));
-        compute.finish_with(Event::Finish);
+        compute.finish_within(Event::Finish, LAST_EVENTS, || hurry.request());
         thread.finish();
         drop(seconds);
         Box::new((service, action))
@@ -204,6 +206,7 @@ struct ComputeState {
     lost: Arc<AtomicU64>,
     /// Losses before the inbox.
     losses: Losses,
+    hurry: Hurry,
     /// True if map messages are among them.
     map_lost: Arc<AtomicBool>,
     calls: BTreeMap<CallId, Client>,
@@ -221,6 +224,8 @@ impl ComputeState {
                 self.search = Some(port);
                 Vec::new()
             }
+            // It would not be complete in time.
+            Event::Map(_) if self.hurry.is_requested() => Vec::new(),
             Event::Map(chunk) => match chunk.decode() {
                 Some(chunk) => self.machine.on_map(&chunk, now_ns),
                 None => Vec::new(),

@@ -20,10 +20,10 @@ use super::outbox::Class;
 use super::parameters::Settings;
 use super::server::Server;
 use super::sources::{FixedTransforms, FromChannel, Sources, Unwritten};
-use crate::compute::{Compute, Inbox};
+use crate::compute::{Compute, Hurry, Inbox};
 use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
-use crate::start::{Finish, NodeError, open_params};
+use crate::start::{Finish, LAST_EVENTS, NodeError, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Level, Node, Runtime, SubscriptionExecutor, Undecoded};
@@ -75,7 +75,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let inputs = Arc::new(Inputs::default());
     let waiting = Arc::new(Waiting::new(limits.events, limits.bytes));
     let auth = viewer.request_auth()?;
-    let losses = MapLosses::default();
+    let (losses, hurry) = (MapLosses::default(), Hurry::default());
     let mut compute_state = ComputeState {
         node: node.clone(),
         broadcaster: Arc::clone(&broadcaster),
@@ -85,7 +85,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         waiting: Arc::clone(&waiting),
         fixed: FixedTransforms::default(),
         fixed_channel,
-        input: MapRequests::new(&node, &reach.mapper, &losses)?,
+        input: MapRequests::new(&node, &reach.mapper, &losses, &hurry)?,
         diagnostics: node.diagnostics(),
         seconds: Throttle::new(Duration::from_secs(1)),
         report_file,
@@ -130,7 +130,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     });
     Ok(Box::new(move || {
         drop((maps, fixed));
-        compute.finish_with(Event::Finish);
+        compute.finish_within(Event::Finish, LAST_EVENTS, || hurry.request());
         server.finish();
         Box::new(())
     }))
@@ -192,12 +192,11 @@ impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Map(chunk) => {
-                let result = chunk.decode().map(|chunk| self.source.on_map(&chunk));
-                self.input.followed(result);
+                self.input.map(chunk, |chunk| self.source.on_map(chunk));
             }
             Event::Update(chunk) => {
-                let result = chunk.decode().map(|chunk| self.source.on_update(&chunk));
-                self.input.followed(result);
+                self.input
+                    .update(chunk, |chunk| self.source.on_update(chunk));
             }
             Event::FixedTransforms(message) => {
                 if let Ok(all) = self.fixed.add(&message) {

@@ -8,10 +8,10 @@ use lattice_msgs::visualization_msgs::MarkerArray;
 
 use super::parameters::Settings;
 use super::{MarkerOptions, MarkerReport, VoxelMarkers};
-use crate::compute::Compute;
+use crate::compute::{Compute, Hurry};
 use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
-use crate::start::{Finish, LAST_FLUSH, NodeError, handed_over, open_params};
+use crate::start::{Finish, LAST_EVENTS, LAST_FLUSH, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Level, Publisher, Runtime, Undecoded};
@@ -36,9 +36,9 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let params = node.params();
     let settings = Settings::from_params(params)?;
     let publisher = node.lossless_publisher("voxel_markers", Qos::MARKERS)?;
-    let losses = MapLosses::default();
+    let (losses, hurry) = (MapLosses::default(), Hurry::default());
     let mut compute_state = ComputeState {
-        input: MapRequests::new(&node, &settings.mapper, &losses)?,
+        input: MapRequests::new(&node, &settings.mapper, &losses, &hurry)?,
         machine: VoxelMarkers::new(settings.markers),
         markers: publisher.clone(),
         diagnostics: node.diagnostics(),
@@ -72,7 +72,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     });
     Ok(Box::new(move || {
         drop(subscriptions);
-        compute.finish_with(Event::Finish);
+        compute.finish_within(Event::Finish, LAST_EVENTS, || hurry.request());
         Box::new(())
     }))
 }
@@ -94,12 +94,11 @@ impl ComputeState {
     fn on(&mut self, event: Event) {
         match event {
             Event::Map(chunk) => {
-                let result = chunk.decode().map(|chunk| self.machine.on_map(&chunk));
-                self.input.followed(result);
+                self.input.map(chunk, |chunk| self.machine.on_map(chunk));
             }
             Event::Update(chunk) => {
-                let result = chunk.decode().map(|chunk| self.machine.on_update(&chunk));
-                self.input.followed(result);
+                self.input
+                    .update(chunk, |chunk| self.machine.on_update(chunk));
             }
             Event::Redraw => self.machine.redraw(),
             Event::Draw => {

@@ -3,9 +3,7 @@
 use lattice_bag::{BagReader, Storage};
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
-use lattice_core::raycast::{
-    ClearOptions, FreeSpaceMap, FreeSpaceOptions, RayBundle, RayClearer,
-};
+use lattice_core::raycast::{ClearOptions, FreeSpaceMap, FreeSpaceOptions, RayBundle, RayClearer};
 use lattice_core::voxels::{VoxelList, VoxelStore};
 use lattice_lab::datasets::{BobcatOptions, write_bobcat};
 use lattice_lab::simulate::drive::Drive;

@@ -128,6 +128,21 @@ fn a_mapper_of_two_million_voxels_ends_in_time_with_its_report() {
     assert_eq!(report["counts"]["keyframes"], 0);
 }
 
+/// Starts a node in a namespace, whose report has its name.
+fn launch(
+    domain: &LoopbackDomain,
+    folder: &Path,
+    [name, namespace]: [&str; 2],
+    params: &[&str],
+) -> Child {
+    let report_file = format!("report_file:={}", folder.join(name).display());
+    let namespace = format!("__ns:={namespace}");
+    let params = params.iter().copied().chain([&*report_file]);
+    let params = params.flat_map(|param| ["-p", param]);
+    let node = ["node", name, "--ros-args", "-r", &namespace].into_iter();
+    start(domain, &node.chain(params).collect::<Vec<_>>())
+}
+
 /// Each node that follows a map of two million voxels, while others draw it, ends in time.
 #[test]
 fn followers_of_two_million_voxels_end_in_time() {
@@ -152,12 +167,7 @@ fn followers_of_two_million_voxels_end_in_time() {
 
     let report = |name: &str| folder.path().join(name);
     let launch = |name: &str, namespace: &str, params: &[&str]| {
-        let report_file = format!("report_file:={}", report(name).display());
-        let namespace = format!("__ns:={namespace}");
-        let params = params.iter().copied().chain([&*report_file]);
-        let params = params.flat_map(|param| ["-p", param]);
-        let node = ["node", name, "--ros-args", "-r", &namespace].into_iter();
-        start(&domain, &node.chain(params).collect::<Vec<_>>())
+        launch(&domain, folder.path(), [name, namespace], params)
     };
     // Each with its task, and the value there that counts the voxels of its map.
     let followers = [
@@ -197,6 +207,55 @@ fn followers_of_two_million_voxels_end_in_time() {
         assert_eq!(*counted, cells, "{name}: {report}");
     }
     interrupted(mapper, &report("lattice_mapper"));
+}
+
+/// Nodes that are still reading a map of two million voxels leave the rest of it out.
+#[test]
+fn followers_in_the_middle_of_a_map_end_in_time() {
+    let folder = tempfile::tempdir().unwrap();
+    grid_map(folder.path(), 128);
+    let domain = LoopbackDomain::take().unwrap();
+    let runtime = peer(&domain);
+    let node = runtime.node("peer").unwrap();
+    let map_dir = format!("map_dir:={}", folder.path().display());
+    let of_cubes = ["lattice:=cubic", "cell_volume_m3:=1.0", "resume:=true"];
+    let params = [&of_cubes[..], &[&map_dir]].concat();
+    let mut mapper = launch(
+        &domain,
+        folder.path(),
+        ["lattice_mapper", "/robot"],
+        &params,
+    );
+    expect(&mut mapper, &["resumed with"]);
+    for (name, namespace, task) in [
+        ("voxel_marker_publisher", "/robot", "markers"),
+        ("map_merger", "/", "merged map"),
+    ] {
+        let (state, stated) = channel();
+        let hear = move |all: Arc<DiagnosticArray>| drop(state.send(all));
+        let shared = SubscriptionExecutor::Shared;
+        let diagnostics = node.subscribe("/diagnostics", Qos::DIAGNOSTICS, shared, hear);
+        let _diagnostics = diagnostics.unwrap();
+        let params: &[&str] = match name {
+            "map_merger" => &["robots:=[robot]"],
+            _ => &[],
+        };
+        let follower = launch(&domain, folder.path(), [name, namespace], params);
+        let late = Instant::now() + PATIENCE;
+        let has_begun = |message: &DiagnosticArray| {
+            let mut of_task = message.status.iter();
+            let status = of_task.find(|of| of.name.ends_with(&format!("{name}: {task}")));
+            let mut values = status.into_iter().flat_map(|status| &status.values);
+            values.any(|value| value.key == "messages_in" && value.value != "0")
+        };
+        while !has_begun(&stated.recv_timeout(PATIENCE).unwrap()) {
+            assert!(Instant::now() < late, "{name} has no map");
+        }
+        let report = interrupted(follower, &folder.path().join(name));
+        let is_counted = report["voxels_not_merged"].is_u64();
+        assert_eq!(is_counted, name == "map_merger", "{report}");
+    }
+    interrupted(mapper, &folder.path().join("lattice_mapper"));
 }
 
 #[test]
