@@ -207,6 +207,23 @@ impl FreeSpaceMap {
         }
     }
 
+    /// Log-odds of a cell in steps of [`super::LOG_ODDS_STEP`]; `None` for a cell without evidence.
+    pub fn log_odds(&self, key: MortonKey) -> Option<i8> {
+        let cell = Packed::new(key.unpack())?;
+        let value = *self.cells.block(cell.block())?.get(cell.place())?;
+        (value != UNKNOWN).then_some(value)
+    }
+
+    /// Smallest log-odds of an occupied cell, in steps of [`super::LOG_ODDS_STEP`].
+    pub fn occupied_log_odds(&self) -> i8 {
+        self.steps.threshold
+    }
+
+    /// Keys of all cells with log-odds, in no particular order.
+    pub fn known_keys(&self) -> impl Iterator<Item = MortonKey> + '_ {
+        self.cells.known().filter_map(|(cell, _)| cell.key())
+    }
+
     fn sorted(&self, wanted: impl Fn(i8) -> bool) -> Vec<MortonKey> {
         let known = self.cells.known();
         let wanted = known.filter(|(_, value)| wanted(*value));
