@@ -12,3 +12,6 @@ pub const LEVELS: u32 = 16;
 pub const HALF: i64 = 1 << (LEVELS - 1);
 /// Class of the written trees, as files and messages name it.
 pub const CLASS: &str = "OcTree";
+
+#[cfg(test)]
+mod tests;
