@@ -96,14 +96,6 @@ impl Octomaps {
         self.problem.clone()
     }
 
-    /// Octrees dropped by the publishers.
-    pub(super) fn not_published(&self) -> u64 {
-        self.topics
-            .iter()
-            .map(|topic| topic.publisher.dropped())
-            .sum()
-    }
-
     /// Waits until the octrees are sent, at most [`LAST_FLUSH`].
     pub(super) fn flush(&self) {
         let begin = Instant::now();

@@ -211,13 +211,14 @@ fn octomap_builds_the_same_tree_from_the_same_rays() {
 }
 
 #[test]
-fn free_and_occupied_space_of_any_lattice_keep_their_volume() {
+fn octrees_are_made_of_any_lattice() {
     for kind in [LatticeKind::Cubic, LatticeKind::Fcc] {
         let mut mapper = mapper(kind);
         let [(_, binary), (_, full)] = octomaps(&mut mapper);
         assert_eq!((binary.binary, full.binary), (true, false));
         assert_eq!(binary.header.frame_id, "map");
-        assert!(binary.data.len() < full.data.len());
+        // A node of a full tree has five bytes, an inner node of a binary one two.
+        assert!(binary.data.len() > 1000 && binary.data.len() < full.data.len());
         assert_eq!(mapper.counts().octomaps_refused, 0);
     }
 }

@@ -39,7 +39,6 @@ impl ComputeState {
         let refused =
             counts.clouds_malformed + counts.clouds_wrong_frame + counts.clouds_stamp_jump;
         let octomaps = self.octomaps.as_ref();
-        let octomaps_lost = octomaps.map_or(0, Octomaps::not_published);
         let (level, message) = if let Some(problem) = self.autosave.problem() {
             (Level::Error, problem)
         } else if let Some(problem) = octomaps.and_then(Octomaps::problem) {
@@ -85,7 +84,6 @@ impl ComputeState {
                 "chunks_not_published".into(),
                 self.output.chunks_lost().to_string(),
             ),
-            ("octomaps_not_published".into(), octomaps_lost.to_string()),
             ("voxels".into(), voxels.to_string()),
             (WORKING.into(), self.unmapped.is_none().to_string()),
             ("rms_m".into(), format!("{:.5}", distortion.rms_m)),
