@@ -112,18 +112,50 @@ impl<'a> OctreeVoxels<'a> {
         let mut blocks: Vec<u64> = self.blocks.into_iter().collect();
         blocks.sort_unstable();
         let half = HALF >> BLOCK_LEVELS;
-        let fill = |block: u64, values: &mut [i8; BLOCK_VOXELS]| {
-            let corner = axes(block).map(|i| (i as i64 - half) << BLOCK_LEVELS);
-            for (place, voxel) in (0_u64..).zip(values) {
-                let [x, y, z] = axes(place).map(|i| i as i64);
-                let [a, b, c] = corner;
-                let middle = Vector3::new(a + x, b + y, c + z);
-                let middle_m = middle.map(|i| (i as f64 + 0.5) * self.resolution_m);
-                let cell = self.lattice.quantize(&(middle_m - self.datum_m));
-                *voxel = cell.map_or(super::UNKNOWN, &value);
-            }
+        let places: Vec<[f64; 3]> = (0..BLOCK_VOXELS as u64)
+            .map(|place| axes(place).map(|i| i as f64 + 0.5))
+            .collect();
+        let mut known = KnownCells::new();
+        let fill = |block: u64, voxels: &mut [i8; BLOCK_VOXELS]| {
+            let [x, y, z] = axes(block).map(|i| ((i as i64 - half) << BLOCK_LEVELS) as f64);
+            let datum_m = self.datum_m;
+            let middles_m = places.iter().map(|[a, b, c]| {
+                let middle_m = Vector3::new(x + a, y + b, z + c) * self.resolution_m;
+                (middle_m - datum_m).into()
+            });
+            let mut voxels = voxels.iter_mut();
+            self.lattice.quantize_each(middles_m, |_, cell| {
+                if let (Some(voxel), Some(cell)) = (voxels.next(), cell) {
+                    *voxel = known.value(cell, &value);
+                }
+            });
         };
         Encoder::run(form, threshold, max_bytes, &blocks, fill)
+    }
+}
+
+/// Values of the last cells: a cell has several voxels, and a look-up in a map takes longer than a comparison.
+struct KnownCells(Vec<(LatticeIndex, i8)>);
+
+impl KnownCells {
+    /// Distinct cells on each axis: more than a block has.
+    const SIDE: i32 = 8;
+
+    fn new() -> Self {
+        let none = ([i32::MIN; 3], super::UNKNOWN);
+        Self(vec![none; Self::SIDE.pow(3) as usize])
+    }
+
+    fn value(&mut self, cell: LatticeIndex, value: impl Fn(LatticeIndex) -> i8) -> i8 {
+        let [x, y, z] = cell.map(|i| i.rem_euclid(Self::SIDE) as usize);
+        match self.0.get_mut(x + 8 * y + 64 * z) {
+            Some((known, value)) if *known == cell => *value,
+            Some(place) => {
+                *place = (cell, value(cell));
+                place.1
+            }
+            None => value(cell),
+        }
     }
 }
 

@@ -31,7 +31,7 @@ pub fn write_octree(
     }
     let resolution_m = voxels.resolution_m();
     let tree = voxels.encode(form, LOG_ODDS_OCCUPIED, usize::MAX, |cell| {
-        let is_occupied = MortonKey::pack(cell).is_some_and(|key| list.get(key).is_some());
+        let is_occupied = MortonKey::pack(cell).is_some_and(|key| list.contains(key));
         if is_occupied {
             LOG_ODDS_OCCUPIED
         } else {
