@@ -42,6 +42,9 @@ const SEED_CELLS: usize = 1 << 14;
 /// let ends = Cloud::from_points(0, Vector3::zeros(), &[Vector3::new(5.0, 0.0, 0.0)]);
 /// map.insert_scan(&[RayBundle { origin_m: Vector3::zeros(), ends: &ends }]);
 /// assert_eq!((map.occupied_keys().len(), map.free_keys().len()), (1, 5));
+/// // One hit adds 0.844, in steps of 1/32.
+/// assert_eq!(map.log_odds(map.occupied_keys()[0]), Some(27));
+/// assert_eq!(map.known_keys().count(), 6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone)]

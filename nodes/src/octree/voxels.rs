@@ -134,7 +134,7 @@ impl<'a> OctreeVoxels<'a> {
     }
 }
 
-/// Values of the last cells: a cell has several voxels, and a look-up in a map takes longer than a comparison.
+/// Values of the last cells: a cell has several voxels, and a search of the map takes longer than a comparison.
 struct KnownCells(Vec<(LatticeIndex, i8)>);
 
 impl KnownCells {
