@@ -37,6 +37,7 @@ pub fn visit_messages(visitor: &mut impl MessageVisitor) {
     map_msgs::visit_messages(visitor);
     nav_msgs::visit_messages(visitor);
     novatel_oem7_msgs::visit_messages(visitor);
+    octomap_msgs::visit_messages(visitor);
     octomap_msgs::visit_services(visitor);
     rcl_interfaces::visit_messages(visitor);
     rcl_interfaces::visit_services(visitor);

@@ -23,6 +23,7 @@ mod map_output;
 pub mod map_projector;
 #[cfg(feature = "headset")]
 pub mod mesh;
+pub mod octree;
 mod options;
 #[cfg(feature = "bags")]
 pub mod replay;

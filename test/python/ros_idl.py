@@ -56,6 +56,14 @@ OccupancyGridUpdate = ros(
     height=uint32,
     data=sequence[int8],
 )
+Octomap = ros(
+    "octomap_msgs/msg/Octomap",
+    header=Header,
+    binary=bool,
+    id=str,
+    resolution=float64,
+    data=sequence[int8],
+)
 Transform = ros("geometry_msgs/msg/Transform", translation=Vector3, rotation=Quaternion)
 TransformStamped = ros(
     "geometry_msgs/msg/TransformStamped", header=Header, child_frame_id=str, transform=Transform

@@ -2,8 +2,8 @@
 
 use thiserror::Error;
 
-/// Step of log-odds.
-const UNIT: f64 = 1.0 / 32.0;
+/// Step of log-odds in fixed point.
+pub const LOG_ODDS_STEP: f64 = 1.0 / 32.0;
 
 /// Log-odds of an unknown cell.
 pub(super) const UNKNOWN: i8 = i8::MIN;
@@ -67,7 +67,7 @@ impl Steps {
         let error = EvidenceError(*evidence);
         let in_units = |p: f64| {
             let fits = (0.02..=0.98).contains(&p);
-            let rounded = fits.then(|| (log_odds(p) / UNIT).round() as i32);
+            let rounded = fits.then(|| (log_odds(p) / LOG_ODDS_STEP).round() as i32);
             rounded.ok_or(error)
         };
         let (up, down) = (in_units(evidence.hit)?, in_units(evidence.miss)?);
@@ -132,8 +132,11 @@ mod tests {
         let mut cell = UNKNOWN;
         let mut after = |step: fn(&Steps, &mut i8), times: usize, expected: f64| {
             (0..times).for_each(|_| step(&steps, &mut cell));
-            let found = f64::from(cell) * UNIT;
-            assert!((found - expected).abs() < 0.5 * UNIT, "{found} {expected}");
+            let found = f64::from(cell) * LOG_ODDS_STEP;
+            assert!(
+                (found - expected).abs() < 0.5 * LOG_ODDS_STEP,
+                "{found} {expected}"
+            );
         };
         after(Steps::hit, 1, 0.8473);
         after(Steps::hit, 10, 3.5110);

@@ -43,6 +43,9 @@ const SEED_CELLS: usize = 1 << 14;
 /// let ends = Cloud::from_points(0, Vector3::zeros(), &[Vector3::new(5.0, 0.0, 0.0)]);
 /// map.insert_scan(&[RayBundle { origin_m: Vector3::zeros(), ends: &ends }]);
 /// assert_eq!((map.occupied_keys().len(), map.free_keys().len()), (1, 5));
+/// // One hit adds 0.844, in steps of 1/32.
+/// assert_eq!(map.log_odds(map.occupied_keys()[0]), Some(27));
+/// assert_eq!(map.known_keys().count(), 6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone)]
@@ -235,6 +238,23 @@ impl FreeSpaceMap {
             Free::Hit | Free::Fine => self.sorted(|value| value < self.steps.threshold),
             Free::Coarse(coarse) => coarse.free_keys(&self.steps, &self.cells),
         }
+    }
+
+    /// Log-odds of a cell in steps of [`super::LOG_ODDS_STEP`]; `None` for a cell without evidence.
+    pub fn log_odds(&self, key: MortonKey) -> Option<i8> {
+        let cell = Packed::new(key.unpack())?;
+        let value = *self.cells.block(cell.block())?.get(cell.place())?;
+        (value != UNKNOWN).then_some(value)
+    }
+
+    /// Smallest log-odds of an occupied cell, in steps of [`super::LOG_ODDS_STEP`].
+    pub fn occupied_log_odds(&self) -> i8 {
+        self.steps.threshold
+    }
+
+    /// Keys of all cells with log-odds, in no particular order.
+    pub fn known_keys(&self) -> impl Iterator<Item = MortonKey> + '_ {
+        self.cells.known().filter_map(|(cell, _)| cell.key())
     }
 
     fn sorted(&self, wanted: impl Fn(i8) -> bool) -> Vec<MortonKey> {

@@ -17,7 +17,7 @@ mod surface;
 mod traversal;
 
 pub use clear::{ClearOptions, ClearReport, RayClearer};
-pub use evidence::{Evidence, EvidenceError};
+pub use evidence::{Evidence, EvidenceError, LOG_ODDS_STEP};
 pub use free_space_options::{FreeSpaceError, FreeSpaceOptions, MAX_FREE_LEVEL, MIN_MAP_BYTES};
 pub use map::FreeSpaceMap;
 pub use scan::{RayBundle, Reach, ScanReport};

@@ -15,8 +15,8 @@ use lattice_nodes::files::atomic_write;
 /// Quantize a point file
 #[derive(Args)]
 pub struct Quantize {
-    /// ply, pcd, las, laz, e57, bt (octomap), xyz or txt (also .bz2), or KITTI bin, with the labels of SemanticKITTI
-    /// from its .label file
+    /// ply, pcd, las, laz, e57, bt or ot (octomap), xyz or txt (also .bz2), or KITTI bin, with the labels of
+    /// SemanticKITTI from its .label file
     file: PathBuf,
     /// cubic, bcc, fcc, mcc, hex, hexopt, several separated by commas, paper, or all
     #[arg(long, default_value = "all")]

@@ -182,7 +182,8 @@ fn stay(url: &str) -> CliResult {
 /// Serves a map file; returns the server and its URL.
 pub fn serve_file(path: &Path, address: SocketAddr) -> CliResult<(viewer_server::Server, String)> {
     let (map, names) = crate::map::read_named(path).map_err(|error| {
-        let points = "a point file (.ply, .pcd, .las, .laz, .e57, .bt, .xyz, .txt, .csv, .bin)";
+        let points =
+            "a point file (.ply, .pcd, .las, .laz, .e57, .bt, .ot, .xyz, .txt, .csv, .bin)";
         let logs = "a log (a rosbag2 folder, .mcap, .db3, .bag, each also as .zstd)";
         format!("{error}; what is shown is a map (.lattice), {points}, {logs}, or {PARAMS}")
     })?;

@@ -44,6 +44,9 @@ pub struct MapperCounts {
     /// Blocks of cells beyond `rays.max_bytes`, where rays clear nothing.
     #[serde(default)]
     pub ray_blocks_refused: u64,
+    /// Octrees not made: the map reaches beyond one, or it has too many bytes.
+    #[serde(default)]
+    pub octomaps_refused: u64,
     /// Updates created.
     pub updates: u64,
     /// Keyframes created.

@@ -34,6 +34,8 @@ pub struct MappedFreeSpace {
     pub evidence: Evidence,
     /// Level of published free cells, `2^free_level` voxels wide; 0: not published.
     pub free_level: u32,
+    /// Whether all cells that rays pass have log-odds, as octrees need them; not with a free level.
+    pub is_fine: bool,
 }
 
 impl MappedFreeSpace {
@@ -84,6 +86,7 @@ impl MappedFreeSpace {
             clear,
             evidence,
             free_level: free_level as u32,
+            is_fine: free_level == 0 && params.bool("octomap_services", false)?,
         })
     }
 }

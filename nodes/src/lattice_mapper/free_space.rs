@@ -58,7 +58,8 @@ impl FreeSpace {
                     evidence: options.evidence,
                     reach: options.clear.reach,
                     spare_touching: options.clear.spare_touching,
-                    free_level: Some(options.free_level).filter(|level| *level > 0),
+                    free_level: Some(options.free_level)
+                        .filter(|level| *level > 0 || options.is_fine),
                     max_bytes: options.clear.max_bytes,
                 };
                 let map = FreeSpaceMap::new(lattice.clone(), datum_near_m, options)?;
@@ -146,14 +147,19 @@ impl FreeSpace {
         }
     }
 
-    /// Lattice and free cells, if they are kept.
-    pub(super) fn free_cells(&self) -> Option<(&Lattice, Vec<MortonKey>)> {
+    /// Hits and misses of the cells, if they are counted.
+    pub(super) fn evidence(&self) -> Option<&FreeSpaceMap> {
         match &self.method {
-            Method::Evidence(map) if map.options().free_level.is_some() => {
-                Some((map.free_lattice(), map.free_keys()))
-            }
-            _ => None,
+            Method::Evidence(map) => Some(map),
+            Method::Clear(_) => None,
         }
+    }
+
+    /// Lattice and cells of the free level, if there is one.
+    pub(super) fn free_cells(&self) -> Option<(&Lattice, Vec<MortonKey>)> {
+        let map = self.evidence()?;
+        let has_level = map.options().free_level.is_some_and(|level| level > 0);
+        has_level.then(|| (map.free_lattice(), map.free_keys()))
     }
 }
 

@@ -12,6 +12,7 @@ mod map_folder;
 pub mod node;
 mod occupancy;
 mod octomap;
+mod octree;
 mod operations;
 mod options;
 mod outputs;

@@ -14,7 +14,7 @@ use lattice_msgs::vision_msgs::LabelInfo;
 
 use super::autosave::Autosave;
 use super::map_folder::MapFolder;
-use super::octomap;
+use super::octomap::{self, Octomaps};
 use super::outputs::Outputs;
 use super::parameters::Settings;
 use super::services::{self, Call};
@@ -73,6 +73,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         machine,
         autosave,
         output,
+        octomaps: (settings.octomap_services.then(|| Octomaps::open(&node))).transpose()?,
         outputs: Outputs::open(&node, old.free_space.free_level > 0)?,
         diagnostics: node.diagnostics(),
         unmapped: Some(Unmapped::new(node.resolve("points_enu")?)),
@@ -210,6 +211,7 @@ struct ComputeState {
     drive: Option<CorrectedDrive>,
     autosave: Autosave,
     output: MapOutput,
+    octomaps: Option<Octomaps>,
     outputs: Outputs,
     diagnostics: Diagnostics,
     /// Present until there is a map.
@@ -264,7 +266,7 @@ impl ComputeState {
                 }
             }
             Event::Update => self.update(),
-            Event::Centers => self.centers(),
+            Event::Centers => self.centers(false),
             Event::Free => self.free(),
             Event::Autosave => self.autosave.save(&self.machine),
             Event::Settings(options, saves) => {
@@ -324,7 +326,10 @@ impl ComputeState {
         self.diagnose();
     }
 
-    fn centers(&mut self) {
+    fn centers(&mut self, is_last: bool) {
+        if let Some(octomaps) = &mut self.octomaps {
+            octomaps.publish(&mut self.machine, is_last);
+        }
         let state = self.machine.state();
         let asked = self.update_requests.centers.swap(false, Ordering::Relaxed);
         let listened = self.outputs.centers.subscriber_count() > 0;
@@ -367,9 +372,10 @@ impl ComputeState {
             left = self.output.pending();
             self.update();
         }
-        self.centers();
+        self.centers(true);
         // Messages not sent by then count as lost.
         self.output.flush();
+        self.octomaps.iter().for_each(Octomaps::flush);
         let (clouds, voxels) = (self.machine.counts().clouds_in, self.machine.cells().len());
         let points = self.machine.distortion().points;
         log::info!("{clouds} clouds, {points} points in {voxels} voxels");

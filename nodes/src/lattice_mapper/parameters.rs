@@ -42,12 +42,12 @@ const ABOUT: &[About] = about! {
     "keep_labels" fixed(MAP): "Whether labels are counted in each voxel: voxel_map, voxel_map_updates and map_centers then contain the most frequent one. Costs 24 bytes a voxel, 8 for each of its labels, and insertion time.";
     "chunk_bytes": "Largest message of voxel_map and voxel_map_updates, bytes. Above 60 kB reliable messages are fragmented, and repair is slow.";
     "update_period_s": "Period of voxel_map_updates.";
-    "centers_period_s": "Period of map_centers.";
+    "centers_period_s": "Period of map_centers, octomap_binary and octomap_full.";
     "free_period_s": "Period of free.";
     "map_dir" fixed("it names outputs"): "Folder of the files of ~/save_map and ~/load_map; by default the working directory. Only map files are replaced.";
     "autosave_period_s": "Period of saves of a changing map, which is also saved at the end; 0: never.";
     "autosave_file" fixed("it names an output"): "File of these saves, below map_dir.";
-    "octomap_services" fixed("services are made with it"): "Whether ~/reset and ~/clear_bbox have the types of octomap_server (std_srvs/Empty, octomap_msgs/BoundingBoxQuery).";
+    "octomap_services" fixed("services are made with it"): "Whether ~/reset and ~/clear_bbox have the types of octomap_server (std_srvs/Empty, octomap_msgs/BoundingBoxQuery), and octomap_binary and octomap_full are topics and services. With free_space: evidence and free_level 0 all cells that rays pass keep their log-odds then.";
     "resume" fixed("it is done at the start"): "Whether the map is loaded from that file at the start, if it exists, instead of starting empty.";
 };
 

@@ -13,13 +13,15 @@ use lattice_msgs::lattice::{
     SaveMap, SaveMapRequest, SaveMapResponse,
 };
 
-use lattice_msgs::octomap_msgs::BoundingBoxQueryResponse;
+use lattice_msgs::octomap_msgs::{BoundingBoxQueryResponse, GetOctomapResponse};
 
 use super::LatticeMapper;
 use super::map_folder::MapFolder;
+use super::octomap;
 use super::operations::region_of;
 use super::plan::{self, Planner};
 use crate::compute::Inbox;
+use crate::octree::OctreeForm;
 use crate::start::NodeError;
 use lattice_runtime::{Node, Reply, Server};
 
@@ -33,6 +35,8 @@ pub(super) enum Call {
     ClearBox(ClearBoxRequest, Reply<ClearBoxResponse>),
     ClearBoundingBox(ClearBoxRequest, Reply<BoundingBoxQueryResponse>),
     Query(QueryMapRequest, Reply<QueryMapResponse>),
+    /// Encode an octree.
+    Octomap(OctreeForm, Reply<GetOctomapResponse>),
     /// Plan a path with the reserved planner.
     Plan(PlanPathRequest, Reply<PlanPathResponse>, Arc<Planner>),
 }
@@ -158,6 +162,7 @@ pub(super) fn answer(
             done.cleared = region_of(&request).ok();
             reply.send(BoundingBoxQueryResponse::default());
         }
+        Call::Octomap(form, reply) => reply.send(octomap::response(machine, form)),
         Call::Query(request, reply) => reply.send(machine.query(&request)),
         Call::Plan(request, reply, planner) => planner.begin(machine, request, reply),
     }

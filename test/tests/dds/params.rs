@@ -95,7 +95,7 @@ fn a_cyclone_peer_describes_dumps_edits_and_loads_parameters() {
     let of = |name: &str| described[name].clone();
     let expected = json!({
         "type": 3,
-        "description": "Period of map_centers.",
+        "description": "Period of map_centers, octomap_binary and octomap_full.",
         "constraints": "",
         "read_only": false,
         "range": [[0.01, 86400.0]],

@@ -5,4 +5,5 @@ mod compatibility;
 mod damaged_bags;
 mod map_file_python;
 mod msgs_conformance;
+mod octrees;
 mod point_files;

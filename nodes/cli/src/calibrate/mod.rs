@@ -35,7 +35,7 @@ use options::SearchOptions;
 #[derive(Args)]
 pub struct Calibrate {
     /// Map file, or ply, pcd, xyz (also .bz2) with or without a number `label` of each point, las, laz, e57, bt
-    /// (octomap), or KITTI bin with a .label file of SemanticKITTI beside it or in ../labels; metres, z up
+    /// or ot (octomap), or KITTI bin with a .label file of SemanticKITTI beside it or in ../labels; metres, z up
     #[arg(long, value_name = "FILE")]
     map: PathBuf,
     /// Cloud to find in it, of the same formats; gravity along -z once the axes are those of ROS. Several clouds

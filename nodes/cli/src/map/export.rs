@@ -14,14 +14,15 @@ use lattice_nodes::files::atomic_write;
 use lattice_nodes::files::export::{
     write_centers_pcd, write_centers_ply, write_centers_xyz, write_mesh_ply, write_octree,
 };
+use lattice_nodes::octree::OctreeForm;
 
 /// Options of `lattice map export`.
 #[derive(Args)]
 pub struct Export {
     /// Map file, as written by `--map-out`
     map: PathBuf,
-    /// File to write: .ply, .pcd or .xyz (centres), .bt (octree of octomap, of half the cell size) or .png (an image);
-    /// PLY without extension
+    /// File to write: .ply, .pcd or .xyz (centres), .bt or .ot (octree of octomap, of half the cell size) or .png (an
+    /// image); PLY without extension
     #[arg(long, short, required_unless_present = "grid")]
     out: Option<PathBuf>,
     /// Occupancy grid to write for Nav2's map_server: a .yaml file, and an image (.pgm) beside it
@@ -72,7 +73,7 @@ enum Target {
     CentersPly,
     CentersPcd,
     CentersXyz,
-    Octree,
+    Octree(OctreeForm),
     MeshPly,
     #[cfg(feature = "lab")]
     Png,
@@ -95,8 +96,8 @@ impl Export {
             Target::CentersPcd => atomic_write::write(out, |out| write_centers_pcd(&list, out)),
             Target::CentersXyz => atomic_write::write(out, |out| write_centers_xyz(&list, out)),
             Target::MeshPly => atomic_write::write(out, |out| write_mesh_ply(&list, out)),
-            Target::Octree => {
-                let tree = atomic_write::write(out, |out| write_octree(&list, out))?;
+            Target::Octree(form) => {
+                let tree = atomic_write::write(out, |out| write_octree(&list, form, out))?;
                 let exact = match list.lattice().kind() {
                     LatticeKind::Cubic => "each cell is eight voxels, exactly",
                     _ => "those with their centre in an occupied cell (--lattice cubic is exact)",
@@ -117,11 +118,12 @@ impl Export {
             ("ply" | "", Form::Centers) => return Ok(Target::CentersPly),
             ("pcd", Form::Centers) => return Ok(Target::CentersPcd),
             ("xyz", Form::Centers) => return Ok(Target::CentersXyz),
-            ("bt", Form::Centers) => return Ok(Target::Octree),
+            ("bt", Form::Centers) => return Ok(Target::Octree(OctreeForm::Binary)),
+            ("ot", Form::Centers) => return Ok(Target::Octree(OctreeForm::Full)),
             ("ply" | "", Form::Mesh) => return Ok(Target::MeshPly),
             #[cfg(feature = "lab")]
             ("png", _) | ("", Form::Png) => return Ok(Target::Png),
-            (_, Form::Centers) => ".ply, .pcd, .xyz or .bt",
+            (_, Form::Centers) => ".ply, .pcd, .xyz, .bt or .ot",
             (_, Form::Mesh) => ".ply",
             #[cfg(feature = "lab")]
             (_, Form::Png) => ".png",

@@ -22,8 +22,8 @@ use super::{CliResult, fleet, init_logging};
 pub enum Map {
     /// Show lattice, size, extent and statistics
     Info(info::Info),
-    /// Export as PLY or PCD (cell centres), PLY mesh of exposed cell faces, octree of octomap (.bt), PNG image, or
-    /// occupancy grid for Nav2 (--grid)
+    /// Export as PLY or PCD (cell centres), PLY mesh of exposed cell faces, octree of octomap (.bt, .ot), PNG image,
+    /// or occupancy grid for Nav2 (--grid)
     Export(export::Export),
     /// Merge the voxels of several maps with the same cells; with one map, convert its form
     Merge(combine::Merge),

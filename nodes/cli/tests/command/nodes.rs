@@ -123,7 +123,7 @@ fn a_map_file_can_be_looked_into_and_exported() {
         2
     );
     for (out, form, known) in [
-        ("a.las", "centers", ".ply, .pcd, .xyz or .bt"),
+        ("a.las", "centers", ".ply, .pcd, .xyz, .bt or .ot"),
         ("a.xyz", "mesh", ".ply"),
     ] {
         let out = directory.path().join(out);

@@ -102,7 +102,9 @@ fn a_map_goes_through_pcd_and_an_octree() {
         8 * voxels
     );
     assert!(told.starts_with(&exact), "{told}");
-    for file in ["map.pcd", "map.bt"] {
+    let with_log_odds = text(&["map", "export", &map, "-o", &at("map.ot")]);
+    assert_eq!(with_log_odds, told);
+    for file in ["map.pcd", "map.bt", "map.ot"] {
         let again = at(&format!("{file}.map"));
         assert_eq!(quantize(&at(file), &again), voxels, "{file}");
         let compared = json(&["map", "diff", &map, &again]);

@@ -20,6 +20,8 @@ pub use pcd::write_centers_pcd;
 use lattice_core::voxels::VoxelList;
 use thiserror::Error;
 
+use crate::octree::OctreeError;
+
 /// Reason for a failed export.
 #[derive(Debug, Error)]
 pub enum ExportError {
@@ -32,17 +34,9 @@ pub enum ExportError {
         i32::MAX
     )]
     TooManyVertices,
-    /// Cell outside an octree, which has 65536 voxels per edge, centred at the origin.
-    #[error(
-        "the cell at {center_m:.1?} m is outside an octree of these cells, which reaches {limit_m} m from the \
-         origin of the map: take larger cells, or a part of the map by `lattice map crop`"
-    )]
-    OutsideOctree {
-        /// Centre of a cell.
-        center_m: [f64; 3],
-        /// Half the edge of the tree.
-        limit_m: f64,
-    },
+    /// Octree that cannot be made.
+    #[error(transparent)]
+    Octree(#[from] OctreeError),
 }
 
 /// PLY element: name, count, and type and name of each property.

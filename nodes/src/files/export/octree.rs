@@ -1,16 +1,12 @@
-//! Export of occupied space as OctoMap's binary tree.
+//! Export of occupied space as an octree of OctoMap.
 
 use std::io::{BufWriter, Write};
 
+use lattice_core::lattice::MortonKey;
 use lattice_core::voxels::VoxelList;
-use nalgebra::Vector3;
 
 use super::ExportError;
-
-/// Levels of the tree below its root.
-const LEVELS: u32 = 16;
-/// Voxels on each side of the tree's centre.
-const HALF: i64 = 1 << (LEVELS - 1);
+use crate::octree::{CLASS, LOG_ODDS_OCCUPIED, OctreeForm, OctreeVoxels, UNKNOWN};
 
 /// Size of a written tree.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -21,24 +17,36 @@ pub struct OctreeSummary {
     pub voxels: usize,
 }
 
-/// Writes the occupied space as a binary tree (`.bt`) of OctoMap; all other space is unknown.
+/// Writes the occupied space as a tree of OctoMap, binary (`.bt`) or with log-odds (`.ot`); all other space is unknown.
 ///
-/// The voxel edge is half the cell size; a voxel is occupied if its centre lies in an
-/// occupied cell. A cubic cell is exactly eight voxels: an octree has corners
-/// where that lattice has centres, so voxels of the full cell size would not align.
-pub fn write_octree(list: &VoxelList, writer: impl Write) -> Result<OctreeSummary, ExportError> {
-    let resolution_m = list.lattice().cell_side_m() / 2.0;
-    let codes = occupied(list, resolution_m)?;
-    let mut tree = Tree::default();
-    if !codes.is_empty() {
-        tree.nodes = 1;
-        tree.add(&codes, LEVELS);
+/// Voxels are those of [`OctreeVoxels`]. Log-odds are 3.5, as a map file has no evidence.
+pub fn write_octree(
+    list: &VoxelList,
+    form: OctreeForm,
+    writer: impl Write,
+) -> Result<OctreeSummary, ExportError> {
+    let mut voxels = OctreeVoxels::new(list.lattice(), list.datum_m());
+    for (key, _) in list.sorted() {
+        voxels.add(key.unpack())?;
     }
+    let resolution_m = voxels.resolution_m();
+    let tree = voxels.encode(form, LOG_ODDS_OCCUPIED, usize::MAX, |cell| {
+        let is_occupied = MortonKey::pack(cell).is_some_and(|key| list.contains(key));
+        if is_occupied {
+            LOG_ODDS_OCCUPIED
+        } else {
+            UNKNOWN
+        }
+    })?;
+    let kind = match form {
+        OctreeForm::Binary => " binary",
+        OctreeForm::Full => "",
+    };
     let mut writer = BufWriter::new(writer);
     write!(
         writer,
-        "# Octomap OcTree binary file\n# (feel free to add / change comments, but leave the first \
-         line as it is!)\n# {}\nid OcTree\nsize {}\nres {resolution_m}\ndata\n",
+        "# Octomap OcTree{kind} file\n# (feel free to add / change comments, but leave the first line as it is!)\n\
+         # {}\nid {CLASS}\nsize {}\nres {resolution_m}\ndata\n",
         super::comment(list),
         tree.nodes,
     )?;
@@ -46,90 +54,8 @@ pub fn write_octree(list: &VoxelList, writer: impl Write) -> Result<OctreeSummar
     writer.flush()?;
     Ok(OctreeSummary {
         resolution_m,
-        voxels: codes.len(),
+        voxels: tree.occupied as usize,
     })
-}
-
-/// Occupied voxels in tree order: three bits per level.
-fn occupied(list: &VoxelList, resolution_m: f64) -> Result<Vec<u64>, ExportError> {
-    let lattice = list.lattice();
-    // Half the extent of a cell on each axis.
-    let reach_m = (lattice.cell().vertices.iter()).fold(Vector3::zeros(), |reach, vertex| {
-        Vector3::sup(&reach, &vertex.abs())
-    });
-    let mut codes = Vec::new();
-    for (key, _) in list.sorted() {
-        let (index, center_m) = (key.unpack(), list.center_m(key));
-        let range = |axis: usize| {
-            let voxel = |m: f64| (m / resolution_m).floor();
-            let (low, high) = (
-                center_m[axis] - reach_m[axis],
-                center_m[axis] + reach_m[axis],
-            );
-            (voxel(low), voxel(high))
-        };
-        let ranges = [range(0), range(1), range(2)];
-        let fits = |(low, high): &(f64, f64)| *low >= -HALF as f64 && *high < HALF as f64;
-        if !ranges.iter().all(fits) {
-            let limit_m = HALF as f64 * resolution_m;
-            return Err(ExportError::OutsideOctree {
-                center_m: center_m.into(),
-                limit_m,
-            });
-        }
-        let [xs, ys, zs] = ranges.map(|(low, high)| low as i64..=high as i64);
-        for z in zs {
-            for y in ys.clone() {
-                for x in xs.clone() {
-                    let voxel = Vector3::new(x, y, z);
-                    let middle_m = voxel.map(|i| (i as f64 + 0.5) * resolution_m);
-                    if lattice.quantize(&(middle_m - list.datum_m())) == Some(index) {
-                        codes.push(code([x, y, z].map(|i| (i + HALF) as u64)));
-                    }
-                }
-            }
-        }
-    }
-    codes.sort_unstable();
-    Ok(codes)
-}
-
-/// Interleaved bits of x, y and z for each level, x lowest.
-fn code(voxel: [u64; 3]) -> u64 {
-    (0..LEVELS).fold(0, |code, level| {
-        let [x, y, z] = voxel.map(|v| v >> level & 1);
-        code | (x | y << 1 | z << 2) << (3 * level)
-    })
-}
-
-#[derive(Default)]
-struct Tree {
-    nodes: u64,
-    /// Two bytes per inner node, depth first.
-    data: Vec<u8>,
-}
-
-impl Tree {
-    /// Adds an inner node with `levels` below it, and its descendants, from its occupied voxels.
-    fn add(&mut self, codes: &[u64], levels: u32) {
-        let below = levels.saturating_sub(1);
-        let child_of = |code: &u64| code >> (3 * below) & 7;
-        let whole = 1_usize << (3 * below);
-        let (mut bits, mut inner) = (0_u16, Vec::new());
-        for child in codes.chunk_by(|a, b| child_of(a) == child_of(b)) {
-            let number = child.first().map_or(0, child_of);
-            self.nodes += 1;
-            let is_full = child.len() == whole;
-            bits |= if is_full { 0b10 } else { 0b11 } << (2 * number);
-            if !is_full {
-                inner.push(child);
-            }
-        }
-        self.data.extend(bits.to_le_bytes());
-        for child in inner {
-            self.add(child, below);
-        }
-    }
 }
 
 #[cfg(test)]
@@ -138,6 +64,7 @@ mod tests {
 
     use lattice_core::cloud::Cloud;
     use lattice_core::lattice::{Lattice, LatticeKind};
+    use nalgebra::Vector3;
 
     use super::*;
 
@@ -215,7 +142,7 @@ mod tests {
     fn a_cell_of_the_cubic_lattice_is_eight_voxels_exactly() {
         let list = list(LatticeKind::Cubic, &wall());
         let mut bytes = Vec::new();
-        let summary = write_octree(&list, &mut bytes).unwrap();
+        let summary = write_octree(&list, OctreeForm::Binary, &mut bytes).unwrap();
         let (leaves, _, res) = leaves(&bytes);
         assert_eq!((summary.voxels, res), (8 * list.len(), 0.25));
         let mut voxels = BTreeSet::new();
@@ -239,7 +166,7 @@ mod tests {
     fn other_lattices_keep_their_volume() {
         for kind in LatticeKind::PAPER {
             let list = list(kind, &wall());
-            let summary = write_octree(&list, Vec::new()).unwrap();
+            let summary = write_octree(&list, OctreeForm::Binary, Vec::new()).unwrap();
             let volume = summary.voxels as f64 / 8.0 / list.len() as f64;
             assert!((0.95..1.05).contains(&volume), "{kind}: {volume}");
         }
@@ -259,7 +186,7 @@ mod tests {
         let mut list = VoxelList::new(lattice, Vector3::zeros(), 100_000).unwrap();
         list.insert(&Cloud::from_points(0, Vector3::zeros(), &block));
         let mut bytes = Vec::new();
-        let summary = write_octree(&list, &mut bytes).unwrap();
+        let summary = write_octree(&list, OctreeForm::Binary, &mut bytes).unwrap();
         let (found, ..) = leaves(&bytes);
         let largest = found.iter().map(|(_, side)| *side).max();
         assert_eq!(largest, Some(32));
@@ -267,14 +194,16 @@ mod tests {
         assert_eq!(volume as usize, summary.voxels);
         list.clear();
         let mut bytes = Vec::new();
-        write_octree(&list, &mut bytes).unwrap();
+        write_octree(&list, OctreeForm::Binary, &mut bytes).unwrap();
         assert_eq!(leaves(&bytes).1, 0);
     }
 
     #[test]
     fn a_map_beyond_the_tree_is_refused_with_its_place() {
         let list = list(LatticeKind::Cubic, &[Vector3::new(8191.9, 0.0, 0.0)]);
-        let error = write_octree(&list, Vec::new()).unwrap_err().to_string();
+        let error = write_octree(&list, OctreeForm::Binary, Vec::new())
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("8192"), "{error}");
     }
 }

@@ -32,6 +32,8 @@ pub enum PointFormat {
     E57,
     /// Binary octree of OctoMap.
     OctoMapBinary,
+    /// Octree of OctoMap with log-odds.
+    OctoMapFull,
 }
 
 impl fmt::Display for PointFormat {
@@ -49,6 +51,7 @@ impl fmt::Display for PointFormat {
             PointFormat::Laz => "LAZ",
             PointFormat::E57 => "E57",
             PointFormat::OctoMapBinary => "OctoMap (binary)",
+            PointFormat::OctoMapFull => "OctoMap (log-odds)",
         })
     }
 }
@@ -66,7 +69,7 @@ pub(super) enum Family {
 }
 
 /// Families by extension.
-const EXTENSIONS: [(&str, Family); 11] = [
+const EXTENSIONS: [(&str, Family); 12] = [
     ("ply", Family::Ply),
     ("pcd", Family::Pcd),
     ("xyz", Family::Text),
@@ -78,6 +81,7 @@ const EXTENSIONS: [(&str, Family); 11] = [
     ("laz", Family::Las),
     ("e57", Family::E57),
     ("bt", Family::Octree),
+    ("ot", Family::Octree),
 ];
 
 /// True for the extension of a point file, compressed or not.
@@ -128,14 +132,8 @@ pub(super) fn detect(start: &[u8], name: &Path) -> Result<Family, PointFileError
     if start.starts_with(b"ASTM-E57") {
         return Ok(Family::E57);
     }
-    if start.starts_with(octree::SIGNATURE) {
+    if start.starts_with(octree::SIGNATURE) || start.starts_with(octree::FULL_SIGNATURE) {
         return Ok(Family::Octree);
-    }
-    if start.starts_with(octree::FULL_SIGNATURE) {
-        return Err(PointFileError::NotRead {
-            what: "an octree with probabilities (.ot)",
-            remedy: "convert it to .bt with octomap's `convert_octree`",
-        });
     }
     by_name(name).ok_or_else(|| {
         let extension = name.extension().unwrap_or_default().to_string_lossy();
@@ -161,14 +159,14 @@ mod tests {
         assert_eq!(detect(b"", "scan.laz"), Some(Family::Las));
         assert_eq!(detect(b"ASTM-E57", "scan"), Some(Family::E57));
         assert_eq!(detect(octree::SIGNATURE, "map"), Some(Family::Octree));
-        assert_eq!(detect(octree::FULL_SIGNATURE, "map.bt"), None);
+        assert_eq!(detect(octree::FULL_SIGNATURE, "map"), Some(Family::Octree));
         assert_eq!(detect(b"1 2 3", "scan.step"), None);
         assert_eq!(detect(b"1 2 3", "scan"), None);
     }
 
     #[test]
     fn point_files_are_known_by_their_names() {
-        for name in ["a.ply", "a.PCD", "a.b.laz", "a.xyz.bz2", "a.bt"] {
+        for name in ["a.ply", "a.PCD", "a.b.laz", "a.xyz.bz2", "a.bt", "a.ot"] {
             assert!(is_named_as_points(Path::new(name)), "{name}");
         }
         for name in ["a", "map.lattice", "a.bz2", "a.ply.zip", "ply"] {

@@ -1,4 +1,4 @@
-//! Point files: PLY, PCD, LAS, text, KITTI scans and OctoMap's binary trees, all optionally compressed with
+//! Point files: PLY, PCD, LAS, text, KITTI scans and OctoMap's trees, all optionally compressed with
 //! bzip2; LAZ and E57 with the feature `survey`.
 //!
 //! Files are read as streams, so that memory is bounded by the points kept, not by a header.

@@ -1,35 +1,53 @@
-//! OctoMap's binary trees (`.bt`): centres of the occupied voxels.
+//! OctoMap's trees, binary (`.bt`) or with log-odds (`.ot`): centres of the occupied voxels.
 //!
-//! A text header, then two bytes per inner node, depth first: two bits for each of its eight
-//! children (unknown, free, occupied or inner node). The tree has 16 levels and is
-//! centred at the origin; bits 0, 1 and 2 of a child's index select the upper half in x, y and z.
+//! A text header, then the nodes, depth first. In a binary tree an inner node has two bytes: two bits for each of its
+//! eight children (unknown, free, occupied or inner node). With log-odds each node has a 32-bit float, the colour of a
+//! `ColorOcTree`, and a byte whose bits are the children that exist. The tree has 16 levels and is centred at the
+//! origin; bits 0, 1 and 2 of a child's index select the upper half in x, y and z.
 
 use super::collect::Collector;
 use super::source::Source;
 use super::{PointFileError, PointFormat};
+use crate::octree::LEVELS;
 
-/// First line of every file.
+/// First line of a binary tree.
 pub(super) const SIGNATURE: &[u8] = b"# Octomap OcTree binary file";
-/// First line of a tree with probabilities.
+/// First line of a tree with log-odds.
 pub(super) const FULL_SIGNATURE: &[u8] = b"# Octomap OcTree file";
 
-/// Levels below the root.
-const LEVELS: u32 = 16;
 /// Limit of header lines.
 const MAX_LINES: u64 = 1000;
 
-/// Resolution and number of nodes from the header.
+/// Resolution, number of nodes, and bytes of a colour, from the header.
 struct Header {
+    format: PointFormat,
     resolution_m: f64,
     nodes: u64,
+    color_bytes: usize,
 }
 
-/// An inner node whose children are read next.
-struct Inner {
+/// A node that is read next.
+struct Next {
     /// Lowest voxel on each axis, relative to the lowest of the tree.
     corner: [u32; 3],
     /// Levels below it.
     levels: u32,
+}
+
+impl Next {
+    const ROOT: Next = Next {
+        corner: [0; 3],
+        levels: LEVELS,
+    };
+
+    fn child(&self, child: u32) -> Next {
+        let levels = self.levels.saturating_sub(1);
+        let corner = [0, 1, 2].map(|axis| {
+            let low = self.corner.get(axis).copied().unwrap_or_default();
+            low + ((child >> axis & 1) << levels)
+        });
+        Next { corner, levels }
+    }
 }
 
 /// Reads the voxels; also returns their edge, metres.
@@ -38,67 +56,116 @@ pub(super) fn read(
     points: &mut Collector,
 ) -> Result<(PointFormat, f64), PointFileError> {
     let header = read_header(source)?;
-    // Number of nodes read; the root is one.
-    let mut nodes = u64::from(header.nodes > 0);
-    let mut inner = Vec::new();
-    if header.nodes > 0 {
-        inner.push(Inner {
-            corner: [0; 3],
-            levels: LEVELS,
-        });
+    let nodes = match (header.nodes, header.format) {
+        (0, _) => 0,
+        (_, PointFormat::OctoMapFull) => read_full(source, points, &header)?,
+        _ => read_binary(source, points, &header)?,
+    };
+    if nodes != header.nodes {
+        let reason = format!("{nodes} nodes, but `size` is {}", header.nodes);
+        return Err(header.fault(source.byte(), &reason));
     }
+    Ok((header.format, header.resolution_m))
+}
+
+impl Header {
+    fn fault(&self, byte: u64, reason: &str) -> PointFileError {
+        PointFileError::Data {
+            format: self.format,
+            byte,
+            reason: reason.to_owned(),
+        }
+    }
+
+    /// Checks the number of nodes read so far.
+    fn check(&self, nodes: u64, source: &Source) -> Result<(), PointFileError> {
+        match nodes > self.nodes {
+            true => Err(self.fault(source.byte(), "more nodes than `size` of the header")),
+            false => Ok(()),
+        }
+    }
+}
+
+const TOO_DEEP: &str = "a voxel of the lowest level has children";
+
+/// Reads a tree with two bits per child; returns its number of nodes.
+fn read_binary(
+    source: &mut Source,
+    points: &mut Collector,
+    header: &Header,
+) -> Result<u64, PointFileError> {
+    // The root is one.
+    let mut nodes = 1;
+    let mut inner = vec![Next::ROOT];
     while let Some(node) = inner.pop() {
         let mut children = [0; 2];
         let part = format_args!("node {nodes} of {}", header.nodes);
         source.exact(&mut children, part)?;
         let children = u16::from_le_bytes(children);
-        let fault = |reason: &str| PointFileError::Data {
-            format: PointFormat::OctoMapBinary,
-            byte: source.byte().saturating_sub(2),
-            reason: reason.to_owned(),
-        };
-        let levels = node.levels.saturating_sub(1);
         // In reverse order: the last pushed node is read first.
-        for child in (0..8_u32).rev() {
-            let corner = [0, 1, 2].map(|axis| {
-                let low = node.corner.get(axis).copied().unwrap_or_default();
-                low + ((child >> axis & 1) << levels)
-            });
-            match children >> (2 * child) & 0b11 {
+        for number in (0..8_u32).rev() {
+            let child = node.child(number);
+            match children >> (2 * number) & 0b11 {
                 0b00 => continue,
                 0b01 => {}
-                0b10 => push_voxels(points, corner, levels, header.resolution_m)?,
-                _ if levels == 0 => return Err(fault("a voxel of the lowest level has children")),
-                _ => inner.push(Inner { corner, levels }),
+                0b10 => push_voxels(points, &child, header.resolution_m)?,
+                _ if child.levels == 0 => return Err(header.fault(source.byte(), TOO_DEEP)),
+                _ => inner.push(child),
             }
             nodes += 1;
         }
-        if nodes > header.nodes {
-            return Err(fault("more nodes than `size` of the header"));
+        header.check(nodes, source)?;
+    }
+    Ok(nodes)
+}
+
+/// Reads a tree with log-odds; returns its number of nodes. A leaf is occupied from 0 on.
+fn read_full(
+    source: &mut Source,
+    points: &mut Collector,
+    header: &Header,
+) -> Result<u64, PointFileError> {
+    let mut nodes = 0;
+    let mut next = vec![Next::ROOT];
+    while let Some(node) = next.pop() {
+        nodes += 1;
+        header.check(nodes + next.len() as u64, source)?;
+        let part = format_args!("node {nodes} of {}", header.nodes);
+        let (mut log_odds, mut color, mut children) = ([0; 4], [0; 3], [0; 1]);
+        source.exact(&mut log_odds, part)?;
+        source.exact(
+            color.get_mut(..header.color_bytes).unwrap_or_default(),
+            part,
+        )?;
+        source.exact(&mut children, part)?;
+        let (log_odds, [children]) = (f32::from_le_bytes(log_odds), children);
+        if !log_odds.is_finite() {
+            let reason = format!("log-odds {log_odds} of a node are not finite");
+            return Err(header.fault(source.byte(), &reason));
         }
+        if children != 0 && node.levels == 0 {
+            return Err(header.fault(source.byte(), TOO_DEEP));
+        }
+        if children == 0 && log_odds >= 0.0 {
+            push_voxels(points, &node, header.resolution_m)?;
+        }
+        let exist = (0..8_u32).rev().filter(|child| children >> child & 1 == 1);
+        next.extend(exist.map(|child| node.child(child)));
     }
-    if nodes != header.nodes {
-        return Err(PointFileError::Data {
-            format: PointFormat::OctoMapBinary,
-            byte: source.byte(),
-            reason: format!("{nodes} nodes, but `size` is {}", header.nodes),
-        });
-    }
-    Ok((PointFormat::OctoMapBinary, header.resolution_m))
+    Ok(nodes)
 }
 
 /// Adds all voxels of an occupied node.
 fn push_voxels(
     points: &mut Collector,
-    corner: [u32; 3],
-    levels: u32,
+    node: &Next,
     resolution_m: f64,
 ) -> Result<(), PointFileError> {
-    let side = 1_u32 << levels;
+    let side = 1_u32 << node.levels;
     // Checked before any is created.
     points.promise_more(u64::from(side).pow(3))?;
     let range = |axis: usize| {
-        let low = corner.get(axis).copied().unwrap_or_default();
+        let low = node.corner.get(axis).copied().unwrap_or_default();
         low..low + side
     };
     // The centre of the tree is between two voxels.
@@ -114,12 +181,17 @@ fn push_voxels(
 }
 
 fn read_header(source: &mut Source) -> Result<Header, PointFileError> {
-    let (mut resolution_m, mut nodes) = (None, None);
+    let (mut resolution_m, mut nodes, mut color_bytes) = (None, None, 0);
+    let is_full = (source.peek()?).starts_with(FULL_SIGNATURE);
+    let format = match is_full {
+        true => PointFormat::OctoMapFull,
+        false => PointFormat::OctoMapBinary,
+    };
     for number in 1..MAX_LINES {
         let line = source.expect_line("the header, before `data`")?;
         let line = line.trim();
         let fault = |reason: String| PointFileError::Line {
-            format: PointFormat::OctoMapBinary,
+            format,
             line: number,
             reason,
         };
@@ -143,9 +215,23 @@ fn read_header(source: &mut Source) -> Result<Header, PointFileError> {
                     return Err(fault(format!("size {value:?} is not a number of nodes")));
                 }
             }
+            // Colours are not in a binary tree.
+            "id" if is_full => {
+                color_bytes = match value {
+                    "OcTree" => 0,
+                    "ColorOcTree" => 3,
+                    _ => {
+                        let value: String = value.chars().take(40).collect();
+                        let known = "OcTree and ColorOcTree";
+                        return Err(fault(format!("id {value:?} is not read, only {known}")));
+                    }
+                }
+            }
             "data" => {
                 let missing = || fault("`data` comes before `res` and `size`".to_owned());
                 return Ok(Header {
+                    format,
+                    color_bytes,
                     resolution_m: resolution_m.ok_or_else(missing)?,
                     nodes: nodes.ok_or_else(missing)?,
                 });
@@ -154,7 +240,7 @@ fn read_header(source: &mut Source) -> Result<Header, PointFileError> {
         }
     }
     Err(PointFileError::Line {
-        format: PointFormat::OctoMapBinary,
+        format,
         line: MAX_LINES,
         reason: format!("no `data` in the first {MAX_LINES} lines"),
     })
@@ -198,6 +284,48 @@ mod tests {
         assert_eq!(eight.len(), 8);
         assert!(eight.contains(&[0.25, 0.75, 0.25]));
         assert_eq!(points(bytes(0, &[]), 9), Ok(vec![]));
+    }
+
+    fn full(id: &str, size: u64, nodes: &[(f32, u8)]) -> Vec<u8> {
+        let header = format!("# Octomap OcTree file\nid {id}\nsize {size}\nres 0.5\ndata\n");
+        let color = if id == "OcTree" { 0 } else { 3 };
+        let node = |(value, children): &(f32, u8)| {
+            [&value.to_le_bytes()[..], &[9; 3][..color], &[*children]].concat()
+        };
+        let nodes: Vec<u8> = nodes.iter().flat_map(node).collect();
+        [header.as_bytes(), &nodes].concat()
+    }
+
+    #[test]
+    fn trees_with_log_odds_have_the_same_voxels() {
+        let way = [vec![(1.0, 128)], vec![(1.0, 1); 14]].concat();
+        let voxels = [
+            vec![(1.0, 0b1111)],
+            vec![(0.5, 0), (-0.5, 0), (0.0, 0), (-2.0, 0)],
+        ];
+        let nodes = [way, voxels.concat()].concat();
+        for id in ["OcTree", "ColorOcTree"] {
+            let found = points(full(id, 20, &nodes), 9).unwrap();
+            assert_eq!(found, [[0.25; 3], [0.25, 0.75, 0.25]], "{id}");
+        }
+        for (bytes, message) in [
+            (full("OcTree", 21, &nodes), "20 nodes, but `size` is 21"),
+            (full("OcTree", 19, &nodes), "more nodes than `size`"),
+            (full("OcTree", 20, &nodes[..19]), "cut short"),
+            (full("OcTree", 1, &[(0.0, 0)]), "but at most 9 are allowed"),
+            (full("OcTree", 1, &[(f32::NAN, 0)]), "log-odds NaN"),
+            (
+                full("OcTree", 99, &[(0.0, 1); 18]),
+                "lowest level has children",
+            ),
+            (
+                full("CountingOcTree", 1, &[]),
+                "only OcTree and ColorOcTree",
+            ),
+        ] {
+            let error = points(bytes, 9).unwrap_err();
+            assert!(error.contains(message), "{error}: {message}");
+        }
     }
 
     #[test]

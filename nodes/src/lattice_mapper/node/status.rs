@@ -3,6 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use super::{ComputeState, NO_VIEWPOINTS};
+use crate::lattice_mapper::octomap::Octomaps;
 use crate::lattice_mapper::{CorrectedDrive, MapperReport};
 use crate::report;
 use lattice_runtime::{Level, WORKING};
@@ -37,7 +38,10 @@ impl ComputeState {
         let not_published = updates + self.output.chunks_lost();
         let refused =
             counts.clouds_malformed + counts.clouds_wrong_frame + counts.clouds_stamp_jump;
+        let octomaps = self.octomaps.as_ref();
         let (level, message) = if let Some(problem) = self.autosave.problem() {
+            (Level::Error, problem)
+        } else if let Some(problem) = octomaps.and_then(Octomaps::problem) {
             (Level::Error, problem)
         } else if let Some(unmapped) = &self.unmapped {
             (Level::Warn, unmapped.message(counts))
