@@ -5,6 +5,7 @@ mod actions;
 mod foreign;
 mod mapping;
 mod ros2_client;
+mod router;
 mod scouting;
 
 use std::io::{BufRead, BufReader, Write};

@@ -254,7 +254,8 @@ impl Peer<'_> {
     }
 
     fn trigger(&self, service: &str) -> Outcome<String> {
-        let name = Name::new("/", service.trim_start_matches('/'))?;
+        let (node, base) = service.rsplit_once('/').ok_or("expected /NODE/NAME")?;
+        let name = Name::new(node, base)?;
         let of = ServiceTypeName::new("std_srvs", "Trigger");
         let client = self
             .node
