@@ -1,4 +1,4 @@
-//! The Python of the tests that have a foreign peer.
+//! Programs of foreign peers: interpreters of Python, and those of `test/zenoh_peers`.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -24,18 +24,33 @@ pub fn zenoh_python() -> Option<PathBuf> {
     named("LATTICE_ZENOH_PYTHON", "requirements-zenoh.txt")
 }
 
+/// The program of `test/zenoh_peers`, a node of ros2-client over Zenoh, that `LATTICE_ZENOH_PEER` names. None: as of [`python`].
+pub fn zenoh_peer() -> Option<PathBuf> {
+    program("LATTICE_ZENOH_PEER", "the program of test/zenoh_peers")
+}
+
+/// The router of the crate `zenohd` that `LATTICE_ZENOHD` names. None: as of [`python`].
+pub fn zenohd() -> Option<PathBuf> {
+    program("LATTICE_ZENOHD", "the router of the crate zenohd")
+}
+
 fn named(variable: &str, requirements: &str) -> Option<PathBuf> {
-    let Some(python) = std::env::var_os(variable) else {
+    let requirements = script(requirements);
+    let what = format!("a python with {} installed", requirements.display());
+    program(variable, &what)
+}
+
+fn program(variable: &str, what: &str) -> Option<PathBuf> {
+    let Some(program) = std::env::var_os(variable) else {
         let test = std::thread::current().name().unwrap_or_default().to_owned();
         // Not eprintln: the test harness would keep it to itself.
         let _ = writeln!(
             std::io::stderr(),
-            "SKIPPED {test}: {variable} is not set; have it name a python with {} installed",
-            script(requirements).display()
+            "SKIPPED {test}: {variable} is not set; have it name {what}"
         );
         return None;
     };
-    Some(python.into())
+    Some(program.into())
 }
 
 /// Path of a file in `test/python/`.

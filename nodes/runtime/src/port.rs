@@ -274,6 +274,16 @@ pub(crate) trait SampleWriter: Send + Sync {
         related: Option<SampleId>,
     ) -> BoxFuture<'_, Result<(), WriteRefusal>>;
 
+    /// True if the transport keeps samples for late joiners even before a peer is matched.
+    fn keeps_samples(&self) -> bool {
+        false
+    }
+
+    /// True if the transport has a reader for the samples of this writer, also one that announces no endpoint.
+    fn has_reader(&self) -> bool {
+        false
+    }
+
     /// True if this body is sent although its write was given up.
     fn is_sending(&self, _: &Bytes) -> bool {
         false

@@ -24,7 +24,7 @@ pub(crate) struct PublisherParts {
     pub writer: Arc<Outbox>,
     pub peers: Arc<Peers>,
     pub local: LocalEndpoint,
-    /// Messages for late joiners; `None` if volatile.
+    /// Messages for late joiners; `None` if volatile, or if the transport keeps them.
     pub latch: Option<Mutex<Latch>>,
     pub shutdown: Shutdown,
     pub _graph: NodeEndpoint,
@@ -53,10 +53,16 @@ impl Latch {
 }
 
 impl PublisherParts {
+    /// True if a volatile message, or one that the transport keeps, is to be passed to it.
+    fn is_wanted(&self) -> bool {
+        let writer = &self.writer;
+        self.peers.remote() > 0 || writer.has_reader() || writer.keeps_samples()
+    }
+
     fn send(&self, message: Serialize) -> Result<(), PublishError> {
         let remote = self.peers.remote() > 0;
         let Some(latch) = &self.latch else {
-            return match remote {
+            return match self.is_wanted() {
                 true => self.writer.send(message),
                 false => Ok(()),
             };
@@ -150,7 +156,7 @@ impl RawPublisher {
             let topic = self.topic();
             log::warn!("{topic}: message not delivered in this process: {error}");
         }
-        if self.parts.latch.is_none() && self.parts.peers.remote() == 0 {
+        if self.parts.latch.is_none() && !self.parts.is_wanted() {
             return Ok(());
         }
         let body = body.split_off(ENCAPSULATION_BYTES);
@@ -178,9 +184,10 @@ macro_rules! shared_by_publishers {
                 self.parts.peers.topic()
             }
 
-            /// Matched subscribers in all processes.
+            /// Matched subscribers in all processes; over Zenoh at least 1 if there is one that announces no endpoint.
             pub fn subscriber_count(&self) -> usize {
-                self.parts.peers.count()
+                let has_reader = self.parts.writer.has_reader();
+                self.parts.peers.count().max(usize::from(has_reader))
             }
 
             /// Calls `callback` at every match with a subscriber, and now if one is matched already.

@@ -85,8 +85,8 @@ fn a_peer_by_the_book_hears_and_is_heard_and_its_rubbish_is_counted() {
         found["service_token"],
         token("/ours/reset", trigger, "::,10:,:,:,,")
     );
-    // Number of the sample, and whether its gid is that of the token. Nothing is sent before there is a subscriber.
-    assert_eq!(found["latched"], json!(["kept", 1, true]));
+    // Number of the sample, and whether its gid is that of the token.
+    assert_eq!(found["latched"], json!(["kept", 2, true]));
     let chatter = json!([["0", 1, true], ["1", 2, true], ["2", 3, true]]);
     assert_eq!(found["chatter"], chatter);
     let reply = TriggerResponse {

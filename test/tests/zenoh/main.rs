@@ -4,9 +4,11 @@
 mod actions;
 mod foreign;
 mod mapping;
+mod ros2_client;
+mod router;
 mod scouting;
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -26,23 +28,32 @@ use lattice_test::python::script;
 /// Long enough for a loaded machine; a test that passes does not wait for it.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A process in Python with Zenoh, which ends with its input.
+/// A process with Zenoh, which ends with its input.
 struct Peer {
     child: Child,
     output: BufReader<std::process::ChildStdout>,
 }
 
 impl Peer {
+    /// The script of the peer in Python.
     fn start(python: &Path, args: &[&str]) -> Self {
-        let mut child = Command::new(python)
-            .arg(script("zenoh_peer.py"))
-            .args(args)
+        Self::spawn(Command::new(python).arg(script("zenoh_peer.py")).args(args))
+    }
+
+    fn spawn(command: &mut Command) -> Self {
+        let mut child = command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
         let output = BufReader::new(child.stdout.take().unwrap());
         Self { child, output }
+    }
+
+    /// Writes a line to its input and returns the next line that it prints, without its end.
+    fn ask(&mut self, line: &str) -> String {
+        writeln!(self.child.stdin.as_mut().unwrap(), "{line}").unwrap();
+        self.line().trim_end().to_owned()
     }
 
     /// The next line that it prints.

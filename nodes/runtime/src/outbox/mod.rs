@@ -4,11 +4,12 @@
 //! a blocked writer delays its own queue only.
 
 mod budget;
+mod state;
 #[cfg(test)]
 mod tests;
 
 use std::cell::Cell;
-use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
+use std::sync::atomic::Ordering::{Relaxed, Release};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -125,34 +126,6 @@ impl Outbox {
     /// Resolved topic or service, for messages.
     pub(crate) fn topic(&self) -> &str {
         &self.shared.topic
-    }
-
-    /// Samples not sent: queue or send window full, or not serializable.
-    pub(crate) fn dropped(&self) -> u64 {
-        self.shared.dropped.load(Relaxed)
-    }
-
-    /// Samples passed to DDS.
-    pub(crate) fn sent(&self) -> u64 {
-        self.shared.sent.load(Relaxed)
-    }
-
-    /// Bytes passed to DDS, without encapsulation headers.
-    pub(crate) fn sent_bytes(&self) -> u64 {
-        self.shared.sent_bytes.load(Relaxed)
-    }
-
-    /// Samples passed to DDS and not acknowledged by reliable readers, including readers that have left.
-    pub(crate) fn unacknowledged(&self) -> u64 {
-        let writer = self.shared.writer();
-        writer.map_or(0, |writer| writer.unacknowledged())
-    }
-
-    /// True if the queue is empty and every reliable reader has acknowledged. Does not wait.
-    pub(crate) fn is_acknowledged(&self) -> bool {
-        let acknowledged =
-            |writer: Arc<dyn SampleWriter>| writer.wait_for_acknowledgments(Duration::ZERO);
-        self.shared.waiting.load(Acquire) == 0 && self.shared.writer().is_none_or(acknowledged)
     }
 
     /// Queues a sample for later serialization. Its size is assumed to be that of the one before.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 use futures::future::{BoxFuture, Either, select};
@@ -41,12 +41,28 @@ impl Sender {
             Self::Cached(publisher) => publisher.put(payload).attachment(attachment).wait(),
         }
     }
+
+    /// Whether a subscription of another session has a matching key, also one without a token. Updated by Zenoh.
+    fn has_reader(&self) -> zenoh::Result<Arc<AtomicBool>> {
+        let has_reader = Arc::new(AtomicBool::new(false));
+        let to = Arc::clone(&has_reader);
+        let listener = match self {
+            Self::Plain(publisher) => publisher.matching_listener(),
+            Self::Cached(publisher) => publisher.matching_listener(),
+        };
+        listener
+            .callback(move |status| to.store(status.matching(), Relaxed))
+            .background()
+            .wait()?;
+        Ok(has_reader)
+    }
 }
 
 /// Writer of one topic.
 pub(super) struct ZenohPublisher {
     id: EndpointId,
     sender: Arc<Sender>,
+    has_reader: Arc<AtomicBool>,
     next: AtomicI64,
     queue: InTurn,
     // Field order is drop order: the token before the publisher.
@@ -83,6 +99,7 @@ impl ZenohPublisher {
         let (token, place) = announce()?;
         Ok(Self {
             id,
+            has_reader: sender.has_reader()?,
             sender: Arc::new(sender),
             next: AtomicI64::new(1),
             queue: InTurn::default(),
@@ -122,6 +139,14 @@ impl SampleWriter for ZenohPublisher {
             let (sender, attachment) = (Arc::clone(&self.sender), attachment(sample));
             move || sender.put(payload(body), attachment)
         })
+    }
+
+    fn keeps_samples(&self) -> bool {
+        matches!(*self.sender, Sender::Cached(_))
+    }
+
+    fn has_reader(&self) -> bool {
+        self.has_reader.load(Relaxed)
     }
 
     fn is_sending(&self, body: &Bytes) -> bool {

@@ -72,12 +72,13 @@ impl Shared {
         };
         let writer = self.outbox(port_topic, qos, when_full)?;
         let id = writer.id();
+        let latches = qos.kept() > 0 && !writer.keeps_samples();
         let of = Some((GraphRole::Publisher, topic.to_owned()));
         let parts = Arc::new(PublisherParts {
             writer,
             peers: Arc::clone(&peers),
             local,
-            latch: (qos.kept() > 0).then(|| Mutex::new(Latch::new(qos))),
+            latch: latches.then(|| Mutex::new(Latch::new(qos))),
             shutdown: self.shutdown.clone(),
             _graph: (self.graph).join(node, EndpointKind::Writer, id, of),
         });
