@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use lattice_msgs::lattice::ClearBoxRequest;
 use lattice_msgs::octomap_msgs::{BoundingBoxQuery, GetOctomap, GetOctomapResponse, Octomap};
@@ -12,7 +12,7 @@ use super::LatticeMapper;
 use super::services::Call;
 use crate::compute::Inbox;
 use crate::octree::OctreeForm;
-use crate::start::LAST_FLUSH;
+use crate::start::{LAST_EVENTS, LAST_FLUSH};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Node, Publisher, RuntimeError, Server};
 
@@ -37,6 +37,8 @@ struct OctomapTopic {
     asked: Arc<AtomicBool>,
     /// State of the last published octree.
     published: Option<(u64, u64, u64)>,
+    /// Time that the last one took.
+    took: Duration,
     due: Instant,
 }
 
@@ -50,6 +52,7 @@ impl Octomaps {
                 publisher: node.publisher(name, Qos::LATCHED)?,
                 asked: Arc::default(),
                 published: None,
+                took: Duration::ZERO,
                 due: Instant::now(),
             };
             let asked = Arc::clone(&topic.asked);
@@ -73,6 +76,11 @@ impl Octomaps {
                 continue;
             }
             let begin = Instant::now();
+            if is_last && topic.took > LAST_EVENTS {
+                let name = topic.publisher.topic();
+                log::warn!("{name}: the last changes are not published, since the node has to end");
+                continue;
+            }
             if begin < topic.due && !is_last {
                 continue;
             }
@@ -87,7 +95,8 @@ impl Octomaps {
                 }
                 Err(error) => self.problem = Some(error.to_string()),
             }
-            topic.due = Instant::now() + begin.elapsed() * PAUSE;
+            topic.took = begin.elapsed();
+            topic.due = Instant::now() + topic.took * PAUSE;
         }
     }
 
