@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use lattice_core::lattice::LatticeKind;
-use lattice_core::raycast::Evidence;
+use lattice_core::raycast::{ClearOptions, Evidence};
 use lattice_msgs::cdr;
 use lattice_msgs::octomap_msgs::{GetOctomapResponse, Octomap};
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
@@ -89,6 +89,11 @@ fn options(kind: LatticeKind) -> MapperOptions {
         free_space: MappedFreeSpace {
             method: FreeSpaceMethod::Evidence,
             evidence: evidence(),
+            // OctoMap's own rule.
+            clear: ClearOptions {
+                spare_touching: false,
+                ..ClearOptions::default()
+            },
             is_fine: true,
             ..MappedFreeSpace::default()
         },
