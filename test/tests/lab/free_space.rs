@@ -151,19 +151,21 @@ enum Rule {
     Evidence(FreeSpaceOptions),
 }
 
+enum Clearer {
+    Rays(Box<RayClearer>),
+    Evidence(Box<FreeSpaceMap>),
+}
+
 /// Voxels of all scans, and those that are left by a rule.
 fn cleared(scans: &[Scan], cell_volume_m3: f64, rule: Rule) -> [VoxelList; 2] {
     let lattice = Lattice::new(LatticeKind::Fcc, cell_volume_m3).unwrap();
     let [mut all, mut left] =
         [0; 2].map(|_| VoxelList::new(lattice.clone(), Vector3::zeros(), usize::MAX).unwrap());
-    let mut clear: Box<dyn FnMut(&mut VoxelList, &[RayBundle])> = match rule {
-        Rule::Clear(options) => {
-            let mut clearer = RayClearer::new(&lattice, options);
-            Box::new(move |store, scan| drop(clearer.clear(store, scan)))
-        }
+    let mut clearer = match rule {
+        Rule::Clear(options) => Clearer::Rays(Box::new(RayClearer::new(&lattice, options))),
         Rule::Evidence(options) => {
-            let mut map = FreeSpaceMap::new(lattice, Vector3::zeros(), options).unwrap();
-            Box::new(move |store, scan| drop(map.clear(store, scan)))
+            let map = FreeSpaceMap::new(lattice, Vector3::zeros(), options);
+            Clearer::Evidence(Box::new(map.unwrap()))
         }
     };
     for scan in scans {
@@ -181,7 +183,10 @@ fn cleared(scans: &[Scan], cell_volume_m3: f64, rule: Rule) -> [VoxelList; 2] {
                 ends,
             })
             .collect();
-        clear(&mut left, &bundles);
+        match &mut clearer {
+            Clearer::Rays(clearer) => clearer.clear(&mut left, &bundles),
+            Clearer::Evidence(map) => map.clear(&mut left, &bundles),
+        };
     }
     [all, left]
 }

@@ -4,6 +4,7 @@
 
 use std::process::Command;
 use std::sync::mpsc::{Receiver, channel};
+use std::time::Instant;
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::hash_of;
@@ -72,12 +73,14 @@ impl Meeting {
 
     /// Waits for the publisher of a topic as announced by the peer.
     fn announced(&self, topic: &str) -> RemotePublisher {
+        let start = Instant::now();
         loop {
             let all = self.node.remote_publishers();
             match all.into_iter().find(|found| found.topic == topic) {
                 Some(found) => return found,
                 None => std::thread::yield_now(),
             }
+            assert!(start.elapsed() < PATIENCE, "{topic} is not announced");
         }
     }
 }
