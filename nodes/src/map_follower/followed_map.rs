@@ -119,6 +119,8 @@ impl FollowedMap {
     ) {
         let old = std::mem::replace(&mut self.voxels, voxels);
         let new = &self.voxels;
+        // Keys in the order of one hash table are inserted slowly into another that grows.
+        touched.reserve(old.len().max(new.len()));
         touched.extend(old.keys().filter(|key| !new.contains_key(key)));
         let changed = new
             .iter()

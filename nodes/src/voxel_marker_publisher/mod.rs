@@ -14,6 +14,7 @@ pub use parameters::declare;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use lattice_core::lattice::MortonKey;
 use lattice_msgs::cdr;
 use lattice_msgs::geometry_msgs::Pose;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
@@ -28,6 +29,11 @@ use crate::map_follower::{FollowError, Followed, MapFollower};
 const NAMESPACE: &str = "voxels";
 /// Serialized bytes of a marker besides points and colours, and of an array besides its markers.
 const OVERHEAD_BYTES: usize = 256;
+
+/// Keys placed between two looks at the time: a millisecond.
+const KEYS_BETWEEN_LOOKS: usize = 4096;
+/// Number of changed voxels that are placed at once: some 50 ms.
+const PLACED_AT_ONCE: usize = 1 << 17;
 
 /// Counters of messages received and markers published.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,6 +69,9 @@ pub struct MarkerReport {
     /// Changed blocks not published by the end.
     #[serde(default)]
     pub blocks_not_drawn: usize,
+    /// Changed voxels left out to end in time.
+    #[serde(default)]
+    pub voxels_not_drawn: usize,
     /// Map chunks rejected by a full inbox or overrun before it.
     #[serde(default)]
     pub inbox_full: u64,
@@ -79,6 +88,8 @@ pub struct VoxelMarkers {
     options: MarkerOptions,
     follower: MapFollower,
     blocks: Blocks,
+    /// Changed voxels that are not in the blocks yet.
+    unplaced: Vec<MortonKey>,
     dirty: BTreeSet<BlockId>,
     /// Marker bytes of each block as last drawn.
     drawn: BTreeMap<BlockId, usize>,
@@ -98,6 +109,7 @@ impl VoxelMarkers {
         Self {
             follower: MapFollower::new(options.max_voxels),
             blocks: Blocks::new(options.block_bits),
+            unplaced: Vec::new(),
             dirty: BTreeSet::new(),
             drawn: BTreeMap::new(),
             wipe: true,
@@ -129,12 +141,8 @@ impl VoxelMarkers {
         if options.block_bits != self.options.block_bits {
             self.blocks = Blocks::new(options.block_bits);
             self.drawn.clear();
-            if let Some(map) = self.follower.map() {
-                let neighbors = map.lattice.face_neighbors();
-                for key in map.voxels().keys() {
-                    self.blocks.set(*key, true, neighbors, &mut self.dirty);
-                }
-            }
+            let map = self.follower.map();
+            self.unplaced = map.map_or_else(Vec::new, |map| map.voxels().keys().copied().collect());
         }
         self.options = options;
         self.style = self.wanted_style();
@@ -178,14 +186,51 @@ impl VoxelMarkers {
 
     /// True if there are changes to publish.
     pub fn is_dirty(&self) -> bool {
-        self.follower.map().is_some() && (self.wipe || !self.dirty.is_empty())
+        let has_changes = !self.dirty.is_empty() || !self.unplaced.is_empty();
+        self.follower.map().is_some() && (self.wipe || has_changes)
+    }
+
+    /// Changed voxels that are not in the blocks yet.
+    pub fn unplaced(&self) -> usize {
+        self.unplaced.len()
+    }
+
+    /// Places changed voxels in the blocks, until `is_over`.
+    fn place(&mut self, is_over: &dyn Fn() -> bool) {
+        let Some(map) = self.follower.map() else {
+            return;
+        };
+        // In order, so that neighbours are near in memory.
+        self.unplaced.sort_unstable();
+        let neighbors = map.lattice.face_neighbors();
+        let mut left = self.unplaced.len();
+        while let Some(key) = self.unplaced.pop() {
+            if left % KEYS_BETWEEN_LOOKS == 0 && is_over() {
+                self.unplaced.push(key);
+                return;
+            }
+            left -= 1;
+            let occupied = map.voxels().contains_key(&key);
+            self.blocks.set(key, occupied, neighbors, &mut self.dirty);
+        }
+        self.unplaced = Vec::new();
     }
 
     /// Arrays of changed blocks, up to `budget_bytes` (but at least one
     /// block); the rest stays pending.
     pub fn take_arrays(&mut self, budget_bytes: usize) -> Vec<MarkerArray> {
+        self.take_arrays_until(budget_bytes, &|| false)
+    }
+
+    /// As [`VoxelMarkers::take_arrays`]; none if `is_over` becomes true before all changes are in their blocks.
+    pub fn take_arrays_until(
+        &mut self,
+        budget_bytes: usize,
+        is_over: &dyn Fn() -> bool,
+    ) -> Vec<MarkerArray> {
         let mut arrays = Vec::new();
-        let Some(map) = self.follower.map() else {
+        self.place(is_over);
+        let Some(map) = self.follower.map().filter(|_| self.unplaced.is_empty()) else {
             return arrays;
         };
         let header = Header {
@@ -262,19 +307,20 @@ impl VoxelMarkers {
             Ok(_) => {}
         }
         let (touched, replaced) = self.follower.take_touched();
-        let Some(map) = self.follower.map() else {
+        if self.follower.map().is_none() {
             return result;
-        };
+        }
         if replaced {
             self.blocks = Blocks::new(self.options.block_bits);
+            self.unplaced.clear();
             self.drawn.clear();
             self.dirty.clear();
             self.wipe = true;
         }
-        let neighbors = map.lattice.face_neighbors();
-        for key in touched {
-            let occupied = map.voxels().contains_key(&key);
-            self.blocks.set(key, occupied, neighbors, &mut self.dirty);
+        self.unplaced.extend(touched);
+        // A keyframe waits until it is drawn, and its changes until then.
+        if self.unplaced.len() <= PLACED_AT_ONCE || self.unplaced.len() > 2 * self.voxels() {
+            self.place(&|| false);
         }
         let wanted = self.wanted_style();
         if wanted != self.style {

@@ -39,6 +39,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let (losses, hurry) = (MapLosses::default(), Hurry::default());
     let mut compute_state = ComputeState {
         input: MapRequests::new(&node, &settings.mapper, &losses, &hurry)?,
+        hurry: hurry.clone(),
         machine: VoxelMarkers::new(settings.markers),
         markers: publisher.clone(),
         diagnostics: node.diagnostics(),
@@ -80,6 +81,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 /// State of the compute thread.
 struct ComputeState {
     input: MapRequests,
+    hurry: Hurry,
     machine: VoxelMarkers,
     markers: Publisher<MarkerArray>,
     diagnostics: Diagnostics,
@@ -128,7 +130,9 @@ impl ComputeState {
         if !self.machine.is_dirty() {
             return;
         }
-        for array in self.machine.take_arrays(self.budget_bytes) {
+        let is_over = || self.hurry.is_requested();
+        let arrays = self.machine.take_arrays_until(self.budget_bytes, &is_over);
+        for array in arrays {
             if let Err(error) = self.markers.publish(Arc::new(array)) {
                 log::debug!("markers not published: {error}");
             }
@@ -192,6 +196,10 @@ impl ComputeState {
                 self.markers.topic()
             );
         }
+        let voxels_not_drawn = self.machine.unplaced();
+        if voxels_not_drawn > 0 {
+            log::warn!("the node ends before it has drawn {voxels_not_drawn} changed voxels");
+        }
         let counts = self.machine.counts().clone();
         let report = MarkerReport {
             counts,
@@ -200,6 +208,7 @@ impl ComputeState {
             published_bytes: self.markers.sent_bytes(),
             arrays_not_published: self.markers.dropped(),
             blocks_not_drawn,
+            voxels_not_drawn,
             inbox_full: self.input.losses().inbox_full(),
             lost_on_network: self.input.losses().on_network(),
             undecodable: self.input.losses().undecodable(),

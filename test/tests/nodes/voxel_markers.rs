@@ -102,6 +102,32 @@ fn line(n: usize, step: f32) -> Vec<[f32; 3]> {
     (0..n).map(|i| [i as f32 * step, 0.1, 0.2]).collect()
 }
 
+/// A large change that is interrupted is drawn as one that is not.
+#[test]
+fn a_large_map_waits_to_be_drawn_and_loses_nothing() {
+    let cells: Vec<[f32; 3]> = (0..150_000)
+        .map(|i| [i % 400, i / 400, 0].map(|v| v as f32 + 0.25))
+        .collect();
+    let [mut interrupted, mut whole] = [0; 2].map(|_| {
+        let mut bench = Bench::new(LatticeKind::Cubic, MarkerOptions::default());
+        bench.mapper.on_cloud(&cloud("map", 1, &cells)).unwrap();
+        bench.mapper.take_update();
+        for chunk in bench.mapper.keyframe() {
+            bench.markers.on_map(&chunk).unwrap();
+        }
+        bench
+    });
+    let looks = std::cell::Cell::new(0);
+    let is_over = || looks.replace(looks.get() + 1) > 3;
+    let arrays = interrupted.markers.take_arrays_until(1 << 20, &is_over);
+    assert!(arrays.is_empty());
+    let unplaced = interrupted.markers.unplaced();
+    assert!(unplaced > 0 && unplaced < 150_000 && interrupted.markers.is_dirty());
+    assert!(interrupted.draw() == whole.draw());
+    assert_eq!(interrupted.markers.unplaced(), 0);
+    assert!(interrupted.shown_points() > 0);
+}
+
 #[test]
 fn one_voxel_is_its_whole_cell() {
     // 6 squares; 6 squares and 8 hexagons; 12 rhombs; 14 faces like BCC; hexagonal prisms.
