@@ -235,7 +235,7 @@ impl MapMerger {
         let mut labels = BTreeMap::new();
         let mut summed = cells.len();
         for (at, &cell) in cells.iter().enumerate() {
-            if at % CELLS_BETWEEN_LOOKS == 0 && is_over() {
+            if at.is_multiple_of(CELLS_BETWEEN_LOOKS) && is_over() {
                 summed = at;
                 break;
             }

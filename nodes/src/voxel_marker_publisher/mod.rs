@@ -205,7 +205,7 @@ impl VoxelMarkers {
         let neighbors = map.lattice.face_neighbors();
         let mut left = self.unplaced.len();
         while let Some(key) = self.unplaced.pop() {
-            if left % KEYS_BETWEEN_LOOKS == 0 && is_over() {
+            if left.is_multiple_of(KEYS_BETWEEN_LOOKS) && is_over() {
                 self.unplaced.push(key);
                 return;
             }
