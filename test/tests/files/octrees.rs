@@ -60,7 +60,7 @@ fn scans() -> Vec<Scan> {
                 _ => [value(-4.0, 4.0), value(-3.0, 3.0), -1.53],
             })
             .collect();
-        if i % 3 == 0 {
+        if i.is_multiple_of(3) {
             points.extend((0..30).map(|_| [2.04, value(1.0, 1.6), value(-1.0, 1.0)]));
         }
         Scan { origin, points }
