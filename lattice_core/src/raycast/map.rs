@@ -84,8 +84,8 @@ impl FreeSpaceMap {
         let [x, y, z] = datum_near_m.into();
         let index = lattice.quantize_wide(&datum_near_m);
         let datum_index = index.ok_or(DatumError { x, y, z })?;
-        // A quarter of the memory is for the masks of one scan, an eighth for those of the voxels that it traverses; with a free level, half of it is for the coarse
-        // lattice.
+        // A quarter of the memory is for the masks of one scan, an eighth for those of the voxels that it traverses; with
+        // a free level, half of it is for the coarse lattice.
         let share = match options.free_level {
             None | Some(0) => options.max_bytes,
             Some(_) => options.max_bytes / 2,

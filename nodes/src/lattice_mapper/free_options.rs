@@ -34,7 +34,7 @@ pub struct MappedFreeSpace {
     pub evidence: Evidence,
     /// Level of published free cells, `2^free_level` voxels wide; 0: not published.
     pub free_level: u32,
-    /// Whether all cells that rays pass have log-odds, as octrees need them; not with a free level.
+    /// Log-odds for all cells that rays pass, as octrees need them; not with a free level.
     pub is_fine: bool,
 }
 

@@ -42,7 +42,7 @@ impl Sender {
         }
     }
 
-    /// Whether a subscription of another session has a matching key, also one without a token. Updated by Zenoh.
+    /// Flag, updated by Zenoh: a subscription of another session has a matching key, also one without a token.
     fn has_reader(&self) -> zenoh::Result<Arc<AtomicBool>> {
         let has_reader = Arc::new(AtomicBool::new(false));
         let to = Arc::clone(&has_reader);
