@@ -6,12 +6,14 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
+use crossbeam_channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, bounded};
 
 use lattice_runtime::Shutdown;
 use lattice_runtime::run_catching_panics;
+
+use crate::start::LAST_PIECE;
 
 /// Limits of a compute thread.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +33,8 @@ type Item<E> = Option<(E, usize)>;
 pub struct Compute<E> {
     inbox: Inbox<E>,
     thread: Option<JoinHandle<()>>,
+    /// Disconnected when the handler is dropped at the end of the thread.
+    ended: Receiver<()>,
     dropped: Arc<AtomicBool>,
 }
 
@@ -50,6 +54,11 @@ impl<E> Clone for Inbox<E> {
         }
     }
 }
+
+/// Cells of a map between two looks at a [`Hurry`]: a millisecond.
+pub const CELLS_BETWEEN_LOOKS: usize = 4096;
+/// Cells of a map that are sorted, then worked off, between two looks at a [`Hurry`]: some 50 ms.
+pub const CELLS_SORTED: usize = 1 << 18;
 
 /// Request to a compute thread to leave out work, since its node has to end.
 #[derive(Clone, Debug, Default)]
@@ -74,7 +83,7 @@ impl<E: Send + 'static> Compute<E> {
         name: &str,
         limits: ComputeLimits,
         shutdown: Shutdown,
-        mut handler: impl FnMut(E) + Send + 'static,
+        handler: impl FnMut(E) + Send + 'static,
     ) -> io::Result<Self> {
         let cores = thread::available_parallelism().map_or(1, usize::from);
         let threads = match limits.threads {
@@ -92,9 +101,12 @@ impl<E: Send + 'static> Compute<E> {
         let in_flight = Arc::clone(&bytes);
         let dropped = Arc::new(AtomicBool::new(false));
         let stop = Arc::clone(&dropped);
+        let (running, ended) = bounded::<()>(0);
         let thread = thread::Builder::new()
             .name(format!("{name} compute"))
             .spawn(move || {
+                let _running = running;
+                let mut handler = handler;
                 run_catching_panics("compute", &shutdown, || {
                     while let Ok(Some((event, size))) = receiver.recv() {
                         if stop.load(Ordering::Acquire) {
@@ -112,6 +124,7 @@ impl<E: Send + 'static> Compute<E> {
                 max_bytes: limits.bytes,
             },
             thread: Some(thread),
+            ended,
             dropped,
         })
     }
@@ -121,31 +134,70 @@ impl<E: Send + 'static> Compute<E> {
         self.inbox.clone()
     }
 
+    /// As [`Compute::finish_with`], and calls `hurry` if that takes longer than `patience`. A thread that has not ended
+    /// [`LAST_PIECE`] later is abandoned with an error in the log.
+    pub fn finish_within(self, last: E, patience: Duration, hurry: impl FnOnce()) {
+        self.finish(last, Some(patience), hurry, Some(LAST_PIECE));
+    }
+
     /// As [`Compute::finish_with`], and calls `hurry` if that takes longer than `patience`.
-    pub fn finish_within(self, last: E, patience: Duration, hurry: impl FnOnce() + Send) {
-        let (done, ended) = bounded::<()>(0);
-        thread::scope(|scope| {
-            scope.spawn(move || {
-                if ended.recv_timeout(patience) == Err(RecvTimeoutError::Timeout) {
-                    hurry();
-                }
-            });
-            self.finish_with(last);
-            drop(done);
-        });
+    pub fn finish_hurrying(self, last: E, patience: Duration, hurry: impl FnOnce()) {
+        self.finish(last, Some(patience), hurry, None);
     }
 
     /// Processes the queued events and a last one, then ends the thread.
-    pub fn finish_with(mut self, last: E) {
-        // Blocks for space, unlike other senders.
-        let sender = &self.inbox.sender;
-        let sent = sender
-            .send(Some((last, 0)))
-            .and_then(|()| sender.send(None));
+    pub fn finish_with(self, last: E) {
+        self.finish(last, None, || {}, None);
+    }
+
+    fn finish(
+        mut self,
+        last: E,
+        patience: Option<Duration>,
+        hurry: impl FnOnce(),
+        rest: Option<Duration>,
+    ) {
+        let mut last = vec![None, Some((last, 0))];
+        if !self.ends_within(&mut last, patience) {
+            hurry();
+            if !self.ends_within(&mut last, rest) {
+                log::error!("the node ends in the middle of its work and without a report");
+                return;
+            }
+        }
         let ended = self.thread.take().map(JoinHandle::join);
-        if sent.is_err() | ended.is_some_and(|ended| ended.is_err()) {
+        if !last.is_empty() || ended.is_some_and(|ended| ended.is_err()) {
             log::error!("a compute thread panicked; its last results are lost");
         }
+    }
+
+    /// Sends the last events, from the end of the list on; true if the thread ends within this time.
+    fn ends_within(&self, last: &mut Vec<Item<E>>, time: Option<Duration>) -> bool {
+        let late = time.map(|time| Instant::now() + time);
+        while let Some(item) = last.pop() {
+            // Blocks for space, unlike other senders.
+            let sender = &self.inbox.sender;
+            let unsent = match late {
+                Some(late) => sender.send_deadline(item, late).err(),
+                None => sender
+                    .send(item)
+                    .err()
+                    .map(|error| SendTimeoutError::Disconnected(error.0)),
+            };
+            if let Some(error) = unsent {
+                let has_ended = error.is_disconnected();
+                last.push(error.into_inner());
+                return has_ended;
+            }
+        }
+        let ended = match late {
+            Some(late) => self.ended.recv_deadline(late),
+            None => self
+                .ended
+                .recv()
+                .map_err(|_| RecvTimeoutError::Disconnected),
+        };
+        ended == Err(RecvTimeoutError::Disconnected)
     }
 }
 
@@ -249,6 +301,36 @@ mod tests {
         assert!(compute.inbox().send(1, 1));
         shutdown.wait();
         compute.finish_with(2);
+    }
+
+    #[test]
+    fn a_thread_that_does_not_end_is_abandoned() {
+        for waiting in [0, 1, 7] {
+            let (_go, wait) = unbounded::<()>();
+            let worker = Compute::spawn("test", LIMITS, Shutdown::default(), move |_: u32| {
+                let _ = wait.recv();
+            })
+            .unwrap();
+            let inbox = worker.inbox();
+            (0..waiting).for_each(|i| _ = inbox.send(i, 0));
+            let mut hurried = false;
+            worker.finish_within(9, Duration::ZERO, || hurried = true);
+            assert!(hurried);
+        }
+    }
+
+    #[test]
+    fn a_thread_in_a_hurry_ends_after_its_last_event() {
+        let (done, results) = unbounded();
+        let (go, wait) = unbounded::<()>();
+        let worker = Compute::spawn("test", LIMITS, Shutdown::default(), move |i: u32| {
+            let _ = wait.recv();
+            done.send(i).unwrap();
+        })
+        .unwrap();
+        assert!(worker.inbox().send(1, 1));
+        worker.finish_within(2, Duration::ZERO, || drop(go));
+        assert_eq!(results.into_iter().collect::<Vec<_>>(), [1, 2]);
     }
 
     #[test]

@@ -12,7 +12,7 @@ use lattice_runtime::{
     Losses, Node, Publisher, RuntimeError, Subscription, SubscriptionExecutor, Undecoded,
 };
 
-use crate::compute::{Hurry, Inbox};
+use crate::compute::Inbox;
 use crate::map_follower::{FollowError, Followed};
 
 /// Counters of messages lost before the compute thread.
@@ -95,8 +95,7 @@ impl MapLosses {
 /// Map of a node: its chunks, keyframe requests to the mapper, and warnings in the log.
 pub struct MapRequests {
     losses: MapLosses,
-    hurry: Hurry,
-    /// True after a keyframe chunk was left out.
+    /// True after a keyframe was left out.
     left_out: bool,
     /// Losses up to the last keyframe request.
     seen: u64,
@@ -106,17 +105,11 @@ pub struct MapRequests {
 }
 
 impl MapRequests {
-    /// Creates requests to the mapper of this name; after `hurry` keyframes are left out.
-    pub fn new(
-        node: &Node,
-        mapper: &str,
-        losses: &MapLosses,
-        hurry: &Hurry,
-    ) -> Result<Self, RuntimeError> {
+    /// Creates requests to the mapper of this name.
+    pub fn new(node: &Node, mapper: &str, losses: &MapLosses) -> Result<Self, RuntimeError> {
         let topic = format!("{mapper}/request_keyframe");
         Ok(Self {
             losses: losses.clone(),
-            hurry: hurry.clone(),
             left_out: false,
             seen: 0,
             request: node.publisher(&topic, Qos::DEFAULT)?,
@@ -125,34 +118,32 @@ impl MapRequests {
         })
     }
 
-    /// Decodes a keyframe chunk and passes it to the follower, unless the node has to end: then the keyframe would often
-    /// not be complete in time.
+    /// Decodes a keyframe chunk and passes it to the follower.
     pub fn map(
         &mut self,
         chunk: Undecoded<LatticeMap>,
         follow: impl FnOnce(&LatticeMap) -> Result<Followed, FollowError>,
     ) {
-        if self.hurry.is_requested() {
-            if !std::mem::replace(&mut self.left_out, true) {
-                log::warn!("the node ends before it has read all of the map that it received");
-            }
-            return;
-        }
         self.followed(chunk.decode().map(|chunk| follow(&chunk)));
     }
 
     /// Decodes an update chunk and passes it to the follower.
     pub fn update(
-        &self,
+        &mut self,
         chunk: Undecoded<LatticeMapUpdate>,
         follow: impl FnOnce(&LatticeMapUpdate) -> Result<Followed, FollowError>,
     ) {
         self.followed(chunk.decode().map(|chunk| follow(&chunk)));
     }
 
-    fn followed(&self, result: Option<Result<Followed, FollowError>>) {
+    fn followed(&mut self, result: Option<Result<Followed, FollowError>>) {
         match result {
             Some(Ok(Followed::NeedKeyframe)) => self.ask_for_keyframe(),
+            Some(Ok(Followed::LeftOut)) => {
+                if !std::mem::replace(&mut self.left_out, true) {
+                    log::warn!("the node ends before it has read all of the map that it received");
+                }
+            }
             Some(Err(error)) => {
                 if let Some(more) = self.refusals.check() {
                     log::warn!("{error} ({more} more like it)");

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
+use crate::compute::Hurry;
 use crate::start::LAST_FLUSH;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Empty;
@@ -26,6 +27,9 @@ pub struct MapOutput {
     updates_lost: u64,
     /// Delays of keyframe chunks by a full publisher.
     chunks_waited: u64,
+    /// Keyframe chunks that were left out since the node had to end.
+    chunks_left_out: u64,
+    hurry: Hurry,
 }
 
 /// Topic and service for keyframe requests; dropping it ends them.
@@ -36,8 +40,8 @@ pub struct KeyframeRequests {
 }
 
 impl MapOutput {
-    /// Creates the map topics, and the topic and service for keyframe requests.
-    pub fn open(node: &Node) -> Result<(Self, KeyframeRequests), RuntimeError> {
+    /// Creates the map topics, and the topic and service for keyframe requests. After `hurry` keyframes are left out.
+    pub fn open(node: &Node, hurry: &Hurry) -> Result<(Self, KeyframeRequests), RuntimeError> {
         let output = Self {
             map: node.publisher("voxel_map", Qos::MAP)?,
             updates: node.publisher("voxel_map_updates", Qos::DELTAS)?,
@@ -45,6 +49,8 @@ impl MapOutput {
             pending: VecDeque::new(),
             updates_lost: 0,
             chunks_waited: 0,
+            chunks_left_out: 0,
+            hurry: hurry.clone(),
         };
         let ask = || {
             let asked = Arc::clone(&output.asked);
@@ -86,6 +92,10 @@ impl MapOutput {
                 log::debug!("update not published: {error}");
             }
         }
+        if self.hurry.is_requested() {
+            self.leave_out();
+            return;
+        }
         // Includes updates dropped later for a slow reader.
         let lost = self.updates.dropped();
         if lost != self.updates_lost {
@@ -108,6 +118,17 @@ impl MapOutput {
         }
     }
 
+    fn leave_out(&mut self) {
+        let chunks = self.pending.len();
+        if chunks > 0 {
+            log::warn!(
+                "the node ends before it has sent {chunks} parts of its map to a late subscriber"
+            );
+        }
+        self.chunks_left_out += chunks as u64;
+        self.pending.clear();
+    }
+
     /// Pending chunks of a keyframe.
     pub fn pending(&self) -> usize {
         self.pending.len()
@@ -126,9 +147,10 @@ impl MapOutput {
         self.updates.dropped()
     }
 
-    /// Keyframe chunks queued but not sent.
+    /// Keyframe chunks not sent.
     pub fn chunks_lost(&self) -> u64 {
-        self.map.dropped().saturating_sub(self.chunks_waited)
+        let dropped = self.map.dropped().saturating_sub(self.chunks_waited);
+        dropped + self.chunks_left_out
     }
 }
 

@@ -10,6 +10,8 @@ use lattice_runtime::params::{ParamError, Params};
 /// Time of an ending node for the messages that it has received; then keyframes among them are left out. With [`LAST_FLUSH`]
 /// a process ends within 2 s of a signal.
 pub const LAST_EVENTS: Duration = Duration::from_millis(500);
+/// Time of an ending node, after [`LAST_EVENTS`], for the piece of work that it is in the middle of. Then it is abandoned.
+pub const LAST_PIECE: Duration = Duration::from_millis(500);
 /// Longest wait of an ending node for the acknowledgements of its last messages: a process ends within 2 s of a signal.
 pub const LAST_FLUSH: Duration = Duration::from_millis(500);
 

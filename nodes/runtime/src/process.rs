@@ -76,8 +76,8 @@ impl Runtime {
             None => None,
         };
         let shared = Shared::start(network, &Enclave { name, secrets })?;
-        shared.receive_buffer.warn_if_short();
         let signals = SignalWatch::start(shared.shutdown.clone())?;
+        shared.receive_buffer.warn_if_short();
         let args = Arc::new(args);
         let main = node(&shared, &args, default_node_name)?;
         let mut runtime = Self {

@@ -20,11 +20,11 @@ use super::parameters::Settings;
 use super::services::{self, Call};
 use super::unmapped::Unmapped;
 use super::{CorrectedDrive, LatticeMapper, MapperOptions};
-use crate::compute::{Compute, Inbox};
+use crate::compute::{Compute, Hurry, Inbox};
 use crate::convert::cloud;
 use crate::map_output::{MapOutput, epoch};
 use crate::report;
-use crate::start::{Finish, NodeError, handed_over, open_params};
+use crate::start::{Finish, LAST_EVENTS, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Losses, Runtime, SubscriptionExecutor, lock};
@@ -57,7 +57,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let update_requests = Arc::new(UpdateRequests::default());
     let max_voxels = Arc::new(AtomicUsize::new(old.voxel_limit()));
     let mut machine = LatticeMapper::new(settings.mapper, epoch())?;
-    let (output, requests) = MapOutput::open(&node)?;
+    let hurry = Hurry::default();
+    let (output, requests) = MapOutput::open(&node, &hurry)?;
     let autosave = Autosave::start(
         settings.autosave,
         &maps,
@@ -185,7 +186,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     });
     Ok(Box::new(move || {
         drop((points, origins, names, corrections));
-        compute.finish_with(Event::Finish);
+        compute.finish_hurrying(Event::Finish, LAST_EVENTS, || hurry.request());
         Box::new((requests, more, calls))
     }))
 }

@@ -29,4 +29,6 @@ pub enum Followed {
     Old,
     /// An earlier message is missing: request a keyframe.
     NeedKeyframe,
+    /// A keyframe was left out: the node has to end.
+    LeftOut,
 }

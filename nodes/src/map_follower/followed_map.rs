@@ -6,9 +6,10 @@ use lattice_core::lattice::{Lattice, MortonKey};
 use lattice_core::registration::{LabelDistribution, SemanticCloud, UNLABELED};
 use lattice_msgs::lattice::{LatticeInfo, LatticeMapUpdate};
 use nalgebra::Vector3;
-use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
+use rustc_hash::{FxBuildHasher, FxHashMap};
 
 use super::FollowError;
+use crate::compute::{CELLS_BETWEEN_LOOKS, Hurry};
 use crate::convert::map::{self, MapMessageError, VoxelState};
 
 /// Lattice and voxels of a followed map.
@@ -111,21 +112,32 @@ impl FollowedMap {
             && self.info.map_from_lattice == info.map_from_lattice
     }
 
-    /// Replaces all voxels; added, changed and removed keys are inserted into `touched`.
+    /// Replaces all voxels; added, changed and removed keys are appended to `touched`. False, and no effect, if the node has
+    /// to end before that.
     pub(super) fn replace(
         &mut self,
         voxels: FxHashMap<MortonKey, VoxelState>,
-        touched: &mut FxHashSet<MortonKey>,
-    ) {
-        let old = std::mem::replace(&mut self.voxels, voxels);
-        let new = &self.voxels;
-        // Keys in the order of one hash table are inserted slowly into another that grows.
-        touched.reserve(old.len().max(new.len()));
-        touched.extend(old.keys().filter(|key| !new.contains_key(key)));
-        let changed = new
-            .iter()
-            .filter(|(key, state)| old.get(key) != Some(state));
-        touched.extend(changed.map(|(key, _)| *key));
+        touched: &mut Vec<MortonKey>,
+        hurry: &Hurry,
+    ) -> bool {
+        let known = touched.len();
+        let gone = self
+            .voxels
+            .keys()
+            .map(|key| (key, !voxels.contains_key(key)));
+        let new = voxels.iter();
+        let new = new.map(|(key, state)| (key, self.voxels.get(key) != Some(state)));
+        for (at, (key, is_touched)) in gone.chain(new).enumerate() {
+            if at.is_multiple_of(CELLS_BETWEEN_LOOKS) && hurry.is_requested() {
+                touched.truncate(known);
+                return false;
+            }
+            if is_touched {
+                touched.push(*key);
+            }
+        }
+        self.voxels = voxels;
+        true
     }
 
     /// Applies an update chunk; repetition has no effect.
@@ -133,7 +145,7 @@ impl FollowedMap {
         &mut self,
         changes: &Changes,
         limit: usize,
-        touched: &mut FxHashSet<MortonKey>,
+        touched: &mut Vec<MortonKey>,
     ) -> Result<(), FollowError> {
         if self.voxels.len() + changes.voxels.len() > limit {
             let new = changes.voxels.iter();
@@ -147,12 +159,12 @@ impl FollowedMap {
         self.stamp_ns = changes.stamp_ns;
         for key in &changes.removed {
             if self.voxels.remove(key).is_some() {
-                touched.insert(*key);
+                touched.push(*key);
             }
         }
         for (key, state) in &changes.voxels {
             if self.voxels.insert(*key, *state) != Some(*state) {
-                touched.insert(*key);
+                touched.push(*key);
             }
         }
         Ok(())

@@ -11,10 +11,10 @@ use std::collections::BTreeMap;
 
 use lattice_core::lattice::MortonKey;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
-use rustc_hash::FxHashSet;
 
 use self::followed_map::Changes;
 use self::incomplete::{Chunks, MAX_WAITING_UPDATES, OpenUpdate, Staging};
+use crate::compute::Hurry;
 use crate::convert::map::{self, History, MapMessageError, VoxelState};
 
 /// Limit of chunks per keyframe or update.
@@ -34,7 +34,7 @@ const PATIENCE_S: [u32; 2] = [2, 64];
 pub struct MapFollower {
     max_voxels: usize,
     map: Option<FollowedMap>,
-    /// Map of the previous epoch until the first keyframe of the new one is complete, if it is kept.
+    /// Map of an earlier epoch until it is taken, if it is kept.
     before: Option<FollowedMap>,
     keeps_before: bool,
     /// Sequence of the voxels; `None` until the first keyframe of an epoch is complete.
@@ -53,7 +53,7 @@ pub struct MapFollower {
     newest: u64,
     staging: Option<Staging>,
     open_updates: BTreeMap<u64, OpenUpdate>,
-    touched: FxHashSet<MortonKey>,
+    touched: Vec<MortonKey>,
     replaced: bool,
     /// A keyframe is needed and has not arrived.
     keyframe_needed: bool,
@@ -61,6 +61,7 @@ pub struct MapFollower {
     too_large: Option<u64>,
     quiet_s: u32,
     patience_s: u32,
+    hurry: Hurry,
 }
 
 impl MapFollower {
@@ -80,24 +81,36 @@ impl MapFollower {
             newest: 0,
             staging: None,
             open_updates: BTreeMap::new(),
-            touched: FxHashSet::default(),
+            touched: Vec::new(),
             replaced: false,
             keyframe_needed: false,
             too_large: None,
             quiet_s: 0,
             patience_s: PATIENCE_S[0],
+            hurry: Hurry::default(),
         }
     }
 
-    /// Keeps the map of an epoch until the first keyframe of the next one is complete.
+    /// Leaves keyframes out after `hurry`.
+    pub fn hurried_by(mut self, hurry: &Hurry) -> Self {
+        self.hurry = hurry.clone();
+        self
+    }
+
+    /// Keeps the map of an epoch that ends until it is taken.
     pub fn keeping_before(mut self) -> Self {
         self.keeps_before = true;
         self
     }
 
-    /// Map of the previous epoch, if it is kept and the first keyframe of the new one is incomplete.
+    /// Map of the first epoch that has ended since [`MapFollower::take_before`], if it is kept.
     pub fn before(&self) -> Option<&FollowedMap> {
         self.before.as_ref()
+    }
+
+    /// Map of the first epoch that has ended since the last call, if it is kept.
+    pub fn take_before(&mut self) -> Option<FollowedMap> {
+        self.before.take()
     }
 
     /// Changes the voxel limit; a larger map stays until its next message.
@@ -123,9 +136,9 @@ impl MapFollower {
         self.differences
     }
 
-    /// Keys of voxels added, changed or removed since the last call, and true if lattice,
+    /// Keys of voxels added, changed or removed since the last call, some more than once, and true if lattice,
     /// epoch or datum are new (then all of the old map is obsolete).
-    pub fn take_touched(&mut self) -> (FxHashSet<MortonKey>, bool) {
+    pub fn take_touched(&mut self) -> (Vec<MortonKey>, bool) {
         (
             std::mem::take(&mut self.touched),
             std::mem::take(&mut self.replaced),
@@ -135,6 +148,9 @@ impl MapFollower {
     /// Handles one chunk of a keyframe.
     pub fn on_map(&mut self, message: &LatticeMap) -> Result<Followed, FollowError> {
         check_chunk(message.chunk, message.chunks)?;
+        if self.hurry.is_requested() {
+            return Ok(Followed::LeftOut);
+        }
         if message.voxels_total > self.max_voxels as u64 {
             self.too_large = Some(message.info.epoch);
             self.patience_s = PATIENCE_S[1];
@@ -363,9 +379,7 @@ impl MapFollower {
         self.newest = self.newest.max(staging.sequence);
         (staging.heard_at, self.quiet_s) = (self.newest, 0);
         if staging.chunks.complete() {
-            if let Err(why) = self.adopt(staging)? {
-                return Ok(self.differ(why));
-            }
+            return self.adopt(staging);
         } else {
             self.staging = Some(staging);
         }
@@ -373,12 +387,13 @@ impl MapFollower {
     }
 
     /// Replaces the voxels by a complete keyframe, then applies the later updates.
-    fn adopt(&mut self, done: Staging) -> Result<Result<(), &'static str>, FollowError> {
+    fn adopt(&mut self, done: Staging) -> Result<Followed, FollowError> {
         let Some(map) = &mut self.map else {
-            return Ok(Ok(()));
+            return Ok(Followed::Applied);
         };
-        map.replace(done.voxels, &mut self.touched);
-        self.before = None;
+        if !map.replace(done.voxels, &mut self.touched, &self.hurry) {
+            return Ok(Followed::LeftOut);
+        }
         if self.sequence.is_none_or(|at| done.sequence > at) {
             self.keyframe_ns = Some(map.stamp_ns);
             (self.sequence, self.history) = (Some(done.sequence), done.history);
@@ -389,7 +404,10 @@ impl MapFollower {
         for changes in done.later.iter().filter(|c| c.sequence > done.sequence) {
             map.apply(changes, self.max_voxels, &mut self.touched)?;
         }
-        Ok(self.advance())
+        Ok(match self.advance() {
+            Ok(()) => Followed::Applied,
+            Err(why) => self.differ(why),
+        })
     }
 }
 

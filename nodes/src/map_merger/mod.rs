@@ -20,11 +20,9 @@ use serde::Serialize;
 pub use parameters::declare;
 pub use robot_map::{Refusal, RobotMap};
 
+use crate::compute::{CELLS_SORTED, Hurry};
 use crate::convert::{geometry, map};
 use crate::map_follower::{FollowError, Followed, MapFollower};
-
-/// Cells summed between two looks at the time: some milliseconds.
-const CELLS_BETWEEN_LOOKS: usize = 4096;
 
 /// Options of a merger.
 #[derive(Clone, PartialEq, Debug)]
@@ -77,7 +75,7 @@ pub struct MergerCounts {
 pub struct MapMerger {
     options: MergerOptions,
     robot_maps: Vec<RobotMap>,
-    /// Changed cells that are not summed yet, in ascending order.
+    /// Changed cells that are not in an update yet, some more than once.
     waiting: Vec<MortonKey>,
     /// `None` before the first robot's map.
     union: Option<VoxelList>,
@@ -103,6 +101,14 @@ impl MapMerger {
             history: map::History::default(),
             counts: MergerCounts::default(),
         }
+    }
+
+    /// Leaves keyframes out after `hurry`.
+    pub fn hurried_by(mut self, hurry: &Hurry) -> Self {
+        let of_robots = self.robot_maps.into_iter();
+        let hurried = of_robots.map(|robot_map| robot_map.hurried_by(hurry));
+        self.robot_maps = hurried.collect();
+        self
     }
 
     /// Changes the options, except robots, frame, datum and labels.
@@ -156,12 +162,15 @@ impl MapMerger {
         self.take_update_until(&|| false)
     }
 
-    /// As [`MapMerger::take_update`]; cells that are not summed when `is_over` becomes true wait for the next one.
+    /// As [`MapMerger::take_update`]; none if `is_over` becomes true before all changes are summed, and then they wait for the
+    /// next one.
     pub fn take_update_until(&mut self, is_over: &dyn Fn() -> bool) -> Vec<LatticeMapUpdate> {
         for robot in 0..self.robot_maps.len() {
             self.admit(robot);
         }
-        self.sum_up(is_over);
+        if !self.sum_up(is_over) {
+            return Vec::new();
+        }
         let Some(union) = &mut self.union else {
             return Vec::new();
         };
@@ -221,44 +230,48 @@ impl MapMerger {
         }
     }
 
-    /// Sums the cells that changed in any map, until `is_over`.
-    fn sum_up(&mut self, is_over: &dyn Fn() -> bool) {
+    /// Sums the cells that changed in any map; false if `is_over` becomes true before the end.
+    fn sum_up(&mut self, is_over: &dyn Fn() -> bool) -> bool {
         let Some(union) = &mut self.union else {
-            return;
+            return true;
         };
-        let mut cells = std::mem::take(&mut self.waiting);
         for robot_map in &mut self.robot_maps {
-            self.counts.voxels_out_of_range += robot_map.take_changed(&mut cells);
+            self.counts.voxels_out_of_range += robot_map.take_changed(&mut self.waiting);
         }
-        cells.sort_unstable();
-        cells.dedup();
         let mut labels = BTreeMap::new();
-        let mut summed = cells.len();
-        for (at, &cell) in cells.iter().enumerate() {
-            if at.is_multiple_of(CELLS_BETWEEN_LOOKS) && is_over() {
-                summed = at;
-                break;
+        // A part in ascending order finds neighbours near in memory; all cells take long to sort.
+        for cells in self.waiting.chunks_mut(CELLS_SORTED) {
+            if is_over() {
+                return false;
             }
-            labels.clear();
-            let mut sum = Voxel::default();
-            for (robot, robot_map) in (0..).zip(&self.robot_maps) {
-                let robot = (self.options.labels == MergedLabels::Robots).then_some(robot);
-                robot_map.add_to(cell, &mut sum, &mut labels, robot);
-            }
-            let labels = labels.iter().map(|(label, count)| LabelCount {
-                label: *label,
-                count: *count,
-            });
-            let labels: Vec<_> = labels.collect();
-            let has_room = union.len() < self.options.max_voxels || union.contains(cell);
-            if !((sum.count == 0 || has_room) && union.put(cell, &sum, &labels)) {
-                self.counts.voxels_list_full += 1;
+            cells.sort_unstable();
+            let mut before = None;
+            for &mut cell in cells {
+                if before.replace(cell) == Some(cell) {
+                    continue;
+                }
+                labels.clear();
+                let mut sum = Voxel::default();
+                for (robot, robot_map) in (0..).zip(&self.robot_maps) {
+                    let robot = (self.options.labels == MergedLabels::Robots).then_some(robot);
+                    robot_map.add_to(cell, &mut sum, &mut labels, robot);
+                }
+                let labels = labels.iter().map(|(label, count)| LabelCount {
+                    label: *label,
+                    count: *count,
+                });
+                let labels: Vec<_> = labels.collect();
+                let has_room = union.len() < self.options.max_voxels || union.contains(cell);
+                if !((sum.count == 0 || has_room) && union.put(cell, &sum, &labels)) {
+                    self.counts.voxels_list_full += 1;
+                }
             }
         }
-        self.waiting = cells.split_off(summed);
+        self.waiting = Vec::new();
+        !is_over()
     }
 
-    /// Number of changed cells that are not summed yet.
+    /// Number of changed cells that are not in an update yet; some count more than once.
     pub fn waiting(&self) -> usize {
         self.waiting.len()
     }

@@ -50,16 +50,16 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let params = node.params();
     let settings = Settings::from_params(params)?;
     let robots = settings.merger.robots.clone();
-    let (output, requests) = MapOutput::open(&node)?;
+    let hurry = Hurry::default();
+    let (output, requests) = MapOutput::open(&node, &hurry)?;
     let label_info = match settings.merger.labels {
         MergedLabels::Robots => Some(names(&node, &settings.merger)?),
         MergedLabels::Own | MergedLabels::None => None,
     };
     let losses: Vec<MapLosses> = robots.iter().map(|_| MapLosses::default()).collect();
-    let hurry = Hurry::default();
     let input = |(robot, losses): (&String, &MapLosses)| {
         let mapper = format!("/{robot}/{}", settings.mapper);
-        MapRequests::new(&node, &mapper, losses, &hurry)
+        MapRequests::new(&node, &mapper, losses)
     };
     let mut compute_state = ComputeState {
         inputs: robots
@@ -68,7 +68,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
             .map(input)
             .collect::<Result<_, _>>()?,
         hurry: hurry.clone(),
-        machine: MapMerger::new(settings.merger, epoch()),
+        machine: MapMerger::new(settings.merger, epoch()).hurried_by(&hurry),
         robots: robots.clone(),
         output,
         diagnostics: node.diagnostics(),
@@ -147,7 +147,7 @@ impl ComputeState {
                 }
             }
             Event::Update(robot, chunk) => {
-                if let Some(input) = self.inputs.get(robot) {
+                if let Some(input) = self.inputs.get_mut(robot) {
                     input.update(chunk, |chunk| self.machine.on_update(robot, chunk));
                 }
             }
@@ -170,11 +170,7 @@ impl ComputeState {
         let update = self.machine.take_update_until(&|| hurry.is_requested());
         // Before the first robot there is no map to publish.
         if self.machine.list().is_some() {
-            let keyframe = || match hurry.is_requested() {
-                true => Vec::new(),
-                false => self.machine.keyframe(),
-            };
-            self.output.publish(update, keyframe);
+            self.output.publish(update, || self.machine.keyframe());
         }
         self.diagnose();
     }
@@ -232,10 +228,7 @@ impl ComputeState {
     fn finish(&mut self) {
         self.publish();
         let mut left = usize::MAX;
-        while self.output.pending() > 0
-            && self.output.pending() < left
-            && !self.hurry.is_requested()
-        {
+        while self.output.pending() > 0 && self.output.pending() < left {
             left = self.output.pending();
             self.publish();
         }

@@ -9,6 +9,7 @@ use lattice_msgs::geographic_msgs::GeoPoint;
 use rustc_hash::FxHashSet;
 use thiserror::Error;
 
+use crate::compute::Hurry;
 use crate::map_follower::{FollowedMap, MapFollower};
 
 /// Tolerance of a datum's distance from a lattice point of the merged map, in cell sizes.
@@ -42,10 +43,12 @@ pub struct RobotMap {
     /// Epoch of the shift.
     epoch: Option<u64>,
     refusal: Option<Refusal>,
-    /// Merged cells that it contributes to.
-    cells: FxHashSet<MortonKey>,
+    /// Merged cells of its map before this epoch, which are to be summed again.
+    obsolete: Vec<MortonKey>,
     /// True if all cells are to be summed again.
     anew: bool,
+    /// Keys of its voxels out of the range of the merged map.
+    out_of_range: FxHashSet<MortonKey>,
     /// Ratio of its offset unit to that of the sums.
     unit: f64,
 }
@@ -57,15 +60,24 @@ impl RobotMap {
             shift: None,
             epoch: None,
             refusal: None,
-            cells: FxHashSet::default(),
+            obsolete: Vec::new(),
             anew: false,
+            out_of_range: FxHashSet::default(),
             unit: 1.0,
         }
     }
 
+    /// Leaves keyframes out after `hurry`.
+    pub(super) fn hurried_by(mut self, hurry: &Hurry) -> Self {
+        self.follower = self.follower.hurried_by(hurry);
+        self
+    }
+
     /// Number of its voxels in the merged map.
     pub fn voxels(&self) -> usize {
-        self.cells.len()
+        let map = self.map().filter(|_| self.shift.is_some());
+        let all = map.map_or(0, |map| map.voxels().len());
+        all.saturating_sub(self.out_of_range.len())
     }
 
     /// Reason why it is not merged.
@@ -104,11 +116,18 @@ impl RobotMap {
         frame: &str,
         origin: Option<&GeoPoint>,
     ) -> Result<Option<GeoPoint>, Refusal> {
+        let before = self.follower.take_before();
         let Some(map) = self.follower.map() else {
             return Ok(None);
         };
+        if let (Some(before), Some(shift)) = (before, self.shift) {
+            let cells = before.voxels().keys();
+            self.obsolete
+                .extend(cells.filter_map(|key| shifted(*key, shift)));
+        }
         self.epoch = Some(map.info.epoch);
         self.anew = true;
+        self.out_of_range.clear();
         self.unit = map.offset_unit_m / OFFSET_UNIT_M;
         let place = place(map, union, frame, origin);
         self.shift = place.as_ref().ok().copied();
@@ -124,30 +143,24 @@ impl RobotMap {
             return 0;
         }
         let (touched, _) = self.follower.take_touched();
-        let mut out_of_range = 0;
-        let of_map = self.follower.map().into_iter();
-        let all = of_map.flat_map(|map| map.voxels().keys().copied());
-        let keys: Vec<MortonKey> = match self.anew {
-            true => all.collect(),
-            false => touched.into_iter().collect(),
-        };
-        if std::mem::take(&mut self.anew) {
-            cells.extend(self.cells.drain());
-        }
-        let Some(shift) = self.shift else {
+        cells.append(&mut self.obsolete);
+        let (Some(map), Some(shift)) = (self.follower.map(), self.shift) else {
             return 0;
         };
-        let voxels = self.follower.map().map(FollowedMap::voxels);
-        for key in keys {
-            let Some(cell) = shifted(key, shift) else {
+        let mut out_of_range = 0;
+        let change = |key| match shifted(key, shift) {
+            Some(cell) => cells.push(cell),
+            None => {
                 out_of_range += 1;
-                continue;
-            };
-            match voxels.is_some_and(|voxels| voxels.contains_key(&key)) {
-                true => self.cells.insert(cell),
-                false => self.cells.remove(&cell),
-            };
-            cells.push(cell);
+                match map.voxels().contains_key(&key) {
+                    true => self.out_of_range.insert(key),
+                    false => self.out_of_range.remove(&key),
+                };
+            }
+        };
+        match std::mem::take(&mut self.anew) {
+            true => map.voxels().keys().copied().for_each(change),
+            false => touched.into_iter().for_each(change),
         }
         out_of_range
     }
@@ -160,9 +173,6 @@ impl RobotMap {
         labels: &mut BTreeMap<u16, u32>,
         robot: Option<u16>,
     ) {
-        if !self.cells.contains(&cell) {
-            return;
-        }
         let own = self.shift.map(|shift| shift.map(i64::wrapping_neg));
         let own = own.and_then(|back| shifted(cell, back));
         let Some(voxel) = own

@@ -23,6 +23,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use self::window::Window;
+use crate::compute::Hurry;
 use crate::convert::geometry;
 use crate::convert::map::VoxelState;
 use crate::map_follower::{FollowError, Followed, FollowedMap, MapFollower};
@@ -105,6 +106,13 @@ impl MapProjector {
             error: None,
             options,
         }
+    }
+
+    /// Leaves keyframes out after `hurry`.
+    pub fn hurried_by(mut self, hurry: &Hurry) -> Self {
+        self.follower = self.follower.hurried_by(hurry);
+        self.free = self.free.hurried_by(hurry);
+        self
     }
 
     /// Forgets the map; counters stay.

@@ -49,12 +49,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         updates: node.publisher("projected_map_updates", Qos::DEFAULT)?,
     };
     let (losses, hurry) = (MapLosses::default(), Hurry::default());
-    let requests = MapRequests::new(&node, &settings.mapper, &losses, &hurry)?;
+    let requests = MapRequests::new(&node, &settings.mapper, &losses)?;
     let mut state = ComputeState {
         requests,
         robot: RobotPosition::new(settings.base_frame),
         needs_free: settings.projector.needs_free(),
-        machine: MapProjector::new(settings.projector),
+        machine: MapProjector::new(settings.projector).hurried_by(&hurry),
         outputs: outputs.clone(),
         diagnostics: node.diagnostics(),
         seconds: Throttle::new(Duration::from_secs(1)),

@@ -37,6 +37,7 @@ use nalgebra::Isometry3;
 
 use self::headset_scans::HeadsetScans;
 use self::state::{CurrentCalibration, PendingRequest, Running};
+use crate::compute::Hurry;
 use crate::convert::calibration::{result_from, set_pose};
 use crate::convert::geometry;
 use crate::map_follower::{FollowError, Followed, MapFollower};
@@ -127,6 +128,12 @@ impl SemanticIcpServer {
             counts: ServerCounts::default(),
             options,
         }
+    }
+
+    /// Leaves keyframes out after `hurry`.
+    pub fn hurried_by(mut self, hurry: &Hurry) -> Self {
+        self.follower = self.follower.hurried_by(hurry);
+        self
     }
 
     /// Handles one keyframe chunk of the map.

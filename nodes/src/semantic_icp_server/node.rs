@@ -73,8 +73,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let guard = TfGuard::new(|_, _| "another headset_frame".to_owned());
     let mut compute_state = ComputeState {
         losses: losses.clone(),
-        hurry: hurry.clone(),
-        machine: SemanticIcpServer::new(server),
+        machine: SemanticIcpServer::new(server).hurried_by(&hurry),
         search: None,
         outputs: Outputs::open(&node, &mapper, &guard)?,
         diagnostics: node.diagnostics(),
@@ -206,7 +205,6 @@ struct ComputeState {
     lost: Arc<AtomicU64>,
     /// Losses before the inbox.
     losses: Losses,
-    hurry: Hurry,
     /// True if map messages are among them.
     map_lost: Arc<AtomicBool>,
     calls: BTreeMap<CallId, Client>,
@@ -224,8 +222,6 @@ impl ComputeState {
                 self.search = Some(port);
                 Vec::new()
             }
-            // It would not be complete in time.
-            Event::Map(_) if self.hurry.is_requested() => Vec::new(),
             Event::Map(chunk) => match chunk.decode() {
                 Some(chunk) => self.machine.on_map(&chunk, now_ns),
                 None => Vec::new(),

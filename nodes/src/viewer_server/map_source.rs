@@ -12,6 +12,7 @@ use serde_bytes::ByteBuf;
 
 use super::map_stream::Entry;
 use super::thin;
+use crate::compute::Hurry;
 use crate::convert::map::{History, KEY_ENCODING, VoxelState, sign};
 use crate::map_follower::{FollowError, Followed, FollowedMap, MapFollower};
 
@@ -50,6 +51,12 @@ impl MapSource {
             follower: MapFollower::new(max_voxels),
             sent: None,
         }
+    }
+
+    /// Leaves keyframes out after `hurry`.
+    pub fn hurried_by(mut self, hurry: &Hurry) -> Self {
+        self.follower = self.follower.hurried_by(hurry);
+        self
     }
 
     /// Handles a keyframe chunk.
@@ -95,8 +102,9 @@ impl MapSource {
             });
             return Ok(MapChange::Replaced);
         };
-        let mut keys: Vec<MortonKey> = touched.into_iter().collect();
+        let mut keys = touched;
         keys.sort_unstable();
+        keys.dedup();
         let mut chunks = update(map, &keys, sent.sequence, sequence);
         let history = sign(&mut chunks, sent.history, sequence, map.voxels().len());
         self.sent = Some(Sent {

@@ -23,6 +23,7 @@ use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
 use serde::{Deserialize, Serialize};
 
 use self::blocks::{BlockId, Blocks};
+use crate::compute::{CELLS_SORTED, Hurry};
 use crate::map_follower::{FollowError, Followed, MapFollower};
 
 /// Namespace of all markers.
@@ -30,8 +31,6 @@ const NAMESPACE: &str = "voxels";
 /// Serialized bytes of a marker besides points and colours, and of an array besides its markers.
 const OVERHEAD_BYTES: usize = 256;
 
-/// Keys placed between two looks at the time: a millisecond.
-const KEYS_BETWEEN_LOOKS: usize = 4096;
 /// Number of changed voxels that are placed at once: some 50 ms.
 const PLACED_AT_ONCE: usize = 1 << 17;
 
@@ -96,6 +95,7 @@ pub struct VoxelMarkers {
     wipe: bool,
     style: MarkerStyle,
     counts: MarkerCounts,
+    hurry: Hurry,
 }
 
 impl VoxelMarkers {
@@ -116,7 +116,15 @@ impl VoxelMarkers {
             style: options.style,
             counts: MarkerCounts::default(),
             options,
+            hurry: Hurry::default(),
         }
+    }
+
+    /// Leaves out keyframes, and changes that are not placed, after `hurry`.
+    pub fn hurried_by(mut self, hurry: &Hurry) -> Self {
+        self.follower = self.follower.hurried_by(hurry);
+        self.hurry = hurry.clone();
+        self
     }
 
     /// CDR bytes of all pending arrays, which are discarded.
@@ -195,41 +203,31 @@ impl VoxelMarkers {
         self.unplaced.len()
     }
 
-    /// Places changed voxels in the blocks, until `is_over`.
-    fn place(&mut self, is_over: &dyn Fn() -> bool) {
+    /// Places changed voxels in the blocks, until the node has to end.
+    fn place(&mut self) {
         let Some(map) = self.follower.map() else {
             return;
         };
-        // In order, so that neighbours are near in memory.
-        self.unplaced.sort_unstable();
         let neighbors = map.lattice.face_neighbors();
-        let mut left = self.unplaced.len();
-        while let Some(key) = self.unplaced.pop() {
-            if left.is_multiple_of(KEYS_BETWEEN_LOOKS) && is_over() {
-                self.unplaced.push(key);
-                return;
+        while !self.unplaced.is_empty() && !self.hurry.is_requested() {
+            let left = self.unplaced.len().saturating_sub(CELLS_SORTED);
+            let mut keys = self.unplaced.split_off(left);
+            // In order, so that neighbours are near in memory.
+            keys.sort_unstable();
+            keys.dedup();
+            for key in keys {
+                let occupied = map.voxels().contains_key(&key);
+                self.blocks.set(key, occupied, neighbors, &mut self.dirty);
             }
-            left -= 1;
-            let occupied = map.voxels().contains_key(&key);
-            self.blocks.set(key, occupied, neighbors, &mut self.dirty);
         }
-        self.unplaced = Vec::new();
+        self.unplaced.shrink_to(CELLS_SORTED);
     }
 
-    /// Arrays of changed blocks, up to `budget_bytes` (but at least one
-    /// block); the rest stays pending.
+    /// Arrays of changed blocks, up to `budget_bytes` (but at least one block) or until the node has to end; the rest stays
+    /// pending. None before all changes are in their blocks.
     pub fn take_arrays(&mut self, budget_bytes: usize) -> Vec<MarkerArray> {
-        self.take_arrays_until(budget_bytes, &|| false)
-    }
-
-    /// As [`VoxelMarkers::take_arrays`]; none if `is_over` becomes true before all changes are in their blocks.
-    pub fn take_arrays_until(
-        &mut self,
-        budget_bytes: usize,
-        is_over: &dyn Fn() -> bool,
-    ) -> Vec<MarkerArray> {
         let mut arrays = Vec::new();
-        self.place(is_over);
+        self.place();
         let Some(map) = self.follower.map().filter(|_| self.unplaced.is_empty()) else {
             return arrays;
         };
@@ -243,7 +241,7 @@ impl VoxelMarkers {
             packer.push(bare(&header, 0, Marker::DELETEALL), &mut arrays);
         }
         let mut blocks = 0;
-        while blocks == 0 || packer.total_bytes < budget_bytes {
+        while (blocks == 0 || packer.total_bytes < budget_bytes) && !self.hurry.is_requested() {
             let Some(block) = self.dirty.pop_first() else {
                 break;
             };
@@ -320,7 +318,7 @@ impl VoxelMarkers {
         self.unplaced.extend(touched);
         // A keyframe waits until it is drawn, and its changes until then.
         if self.unplaced.len() <= PLACED_AT_ONCE || self.unplaced.len() > 2 * self.voxels() {
-            self.place(&|| false);
+            self.place();
         }
         let wanted = self.wanted_style();
         if wanted != self.style {

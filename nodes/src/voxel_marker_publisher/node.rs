@@ -38,9 +38,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let publisher = node.lossless_publisher("voxel_markers", Qos::MARKERS)?;
     let (losses, hurry) = (MapLosses::default(), Hurry::default());
     let mut compute_state = ComputeState {
-        input: MapRequests::new(&node, &settings.mapper, &losses, &hurry)?,
-        hurry: hurry.clone(),
-        machine: VoxelMarkers::new(settings.markers),
+        input: MapRequests::new(&node, &settings.mapper, &losses)?,
+        machine: VoxelMarkers::new(settings.markers).hurried_by(&hurry),
         markers: publisher.clone(),
         diagnostics: node.diagnostics(),
         seconds: Throttle::new(Duration::from_secs(1)),
@@ -81,7 +80,6 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 /// State of the compute thread.
 struct ComputeState {
     input: MapRequests,
-    hurry: Hurry,
     machine: VoxelMarkers,
     markers: Publisher<MarkerArray>,
     diagnostics: Diagnostics,
@@ -130,9 +128,7 @@ impl ComputeState {
         if !self.machine.is_dirty() {
             return;
         }
-        let is_over = || self.hurry.is_requested();
-        let arrays = self.machine.take_arrays_until(self.budget_bytes, &is_over);
-        for array in arrays {
+        for array in self.machine.take_arrays(self.budget_bytes) {
             if let Err(error) = self.markers.publish(Arc::new(array)) {
                 log::debug!("markers not published: {error}");
             }

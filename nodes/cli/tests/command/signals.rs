@@ -4,14 +4,14 @@ use std::io::{BufRead, BufReader, Write, stderr};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use lattice_msgs::diagnostic_msgs::DiagnosticArray;
+use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use lattice_msgs::nav_msgs::OccupancyGrid;
 use lattice_msgs::visualization_msgs::MarkerArray;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{LoopbackDomain, SubscriptionExecutor};
+use lattice_runtime::{LoopbackDomain, Runtime, Subscription, SubscriptionExecutor};
 use serde_json::Value;
 use wait_timeout::ChildExt;
 
@@ -69,8 +69,17 @@ fn lists_no_node_that_was_interrupted(python: &Path) {
 #[test]
 fn two_interrupts_at_once_are_one() {
     let domain = LoopbackDomain::take().unwrap();
+    let runtime = peer(&domain);
+    let (_diagnostics, stated) = diagnostics(&runtime);
     let mut node = start(&domain, &["node", "lattice_mapper"]);
-    expect(&mut node, &["lattice_mapper"]);
+    let is_its = |status: &DiagnosticStatus| status.name.starts_with("lattice_mapper: ");
+    while !stated
+        .recv_timeout(PATIENCE)
+        .unwrap()
+        .status
+        .iter()
+        .any(is_its)
+    {}
     let id = node.id().to_string();
     let both = Command::new("kill")
         .args(["-INT", &id, &id])
@@ -79,6 +88,16 @@ fn two_interrupts_at_once_are_one() {
     assert!(both.success());
     let status = node.wait_timeout(PATIENCE).unwrap().unwrap();
     assert!(status.success(), "{status}");
+}
+
+/// Diagnostics of all nodes from now on.
+fn diagnostics(runtime: &Runtime) -> (Subscription, Receiver<Arc<DiagnosticArray>>) {
+    let node = runtime.node("peer").unwrap();
+    let (state, stated) = channel();
+    let hear = move |all: Arc<DiagnosticArray>| drop(state.send(all));
+    let shared = SubscriptionExecutor::Shared;
+    let subscription = node.subscribe("/diagnostics", Qos::DIAGNOSTICS, shared, hear);
+    (subscription.unwrap(), stated)
 }
 
 /// Interrupts a node, which must end in time; its report.
@@ -151,11 +170,7 @@ fn followers_of_two_million_voxels_end_in_time() {
     let domain = LoopbackDomain::take().unwrap();
     let runtime = peer(&domain);
     let node = runtime.node("peer").unwrap();
-    let (state, stated) = channel();
-    let hear = move |all: Arc<DiagnosticArray>| drop(state.send(all));
-    let shared = SubscriptionExecutor::Shared;
-    let diagnostics = node.subscribe("/diagnostics", Qos::DIAGNOSTICS, shared, hear);
-    let _diagnostics = diagnostics.unwrap();
+    let (_diagnostics, stated) = diagnostics(&runtime);
     // What is subscribed to is drawn.
     let drawn = |_: Arc<MarkerArray>| {};
     let dedicated = SubscriptionExecutor::Dedicated;
@@ -236,11 +251,7 @@ fn followers_in_the_middle_of_a_map_end_in_time() {
         ),
         ("map_merger", "/", "merged map", "voxels_not_merged"),
     ] {
-        let (state, stated) = channel();
-        let hear = move |all: Arc<DiagnosticArray>| drop(state.send(all));
-        let shared = SubscriptionExecutor::Shared;
-        let diagnostics = node.subscribe("/diagnostics", Qos::DIAGNOSTICS, shared, hear);
-        let _diagnostics = diagnostics.unwrap();
+        let (_diagnostics, stated) = diagnostics(&runtime);
         let params: &[&str] = match name {
             "map_merger" => &["robots:=[robot]"],
             _ => &[],

@@ -2,6 +2,7 @@
 
 use lattice_core::lattice::LatticeKind;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_nodes::compute::Hurry;
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::map_follower::{Followed, MapFollower};
 use lattice_test::maps::{self, follow_keyframe, follow_update, insert};
@@ -72,6 +73,26 @@ fn a_follower_of_deltas_has_the_same_voxels() {
         }
         assert_eq!(follower.sequence(), Some(10));
     }
+}
+
+#[test]
+fn a_follower_that_has_to_end_leaves_keyframes_out_and_takes_updates() {
+    let mut mapper = mapper(LatticeKind::Fcc);
+    let hurry = Hurry::default();
+    let mut follower = new().hurried_by(&hurry);
+    follow(&mut follower, &mapper.keyframe());
+    insert(&mut mapper, &scatter(1, 20_000, [0.0; 3], 100.0));
+    let update = mapper.take_update();
+    let keyframe = mapper.keyframe();
+    hurry.request();
+    for chunk in &keyframe {
+        assert_eq!(follower.on_map(chunk).unwrap(), Followed::LeftOut);
+    }
+    assert_eq!(follower.sequence(), Some(0));
+    for chunk in &update {
+        assert_eq!(follower.on_update(chunk).unwrap(), Followed::Applied);
+    }
+    assert_same(&follower, &mapper);
 }
 
 #[test]
