@@ -14,6 +14,7 @@ pub mod executables;
 pub mod files;
 #[cfg(feature = "headset")]
 pub mod headset_cloud;
+pub mod hurry;
 pub mod lattice_mapper;
 pub mod lidar_odometry;
 pub mod map_follower;

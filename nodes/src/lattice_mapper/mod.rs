@@ -46,6 +46,7 @@ use std::sync::{Arc, OnceLock};
 use self::free_space::FreeSpace;
 use self::occupancy::OccupancyMap;
 use crate::convert::{cloud, geometry, map, semantic, viewpoint};
+use crate::hurry::Hurry;
 use crate::stamps::StampGate;
 
 /// Builds one occupied voxel list, and its updates for followers.
@@ -68,6 +69,7 @@ pub struct LatticeMapper {
     counts: MapperCounts,
     /// Search shells for queries, created at the first one.
     shells: OnceLock<Arc<Shells>>,
+    hurry: Hurry,
 }
 
 impl LatticeMapper {
@@ -99,7 +101,14 @@ impl LatticeMapper {
             forgot_at_ns: 0,
             counts: MapperCounts::default(),
             shells: OnceLock::new(),
+            hurry: Hurry::default(),
         })
+    }
+
+    /// Leaves keyframes out after `hurry`.
+    pub fn hurried_by(mut self, hurry: &Hurry) -> Self {
+        self.hurry = hurry.clone();
+        self
     }
 
     /// Changes the options, except those that the map was created with.
@@ -384,6 +393,7 @@ impl LatticeMapper {
 
     fn stamp(&self) -> map::MapStamp<'_> {
         map::MapStamp {
+            hurry: self.hurry.clone(),
             header: self.header(),
             epoch: self.epoch,
             sequence: self.sequence,

@@ -20,8 +20,9 @@ use super::parameters::Settings;
 use super::services::{self, Call};
 use super::unmapped::Unmapped;
 use super::{CorrectedDrive, LatticeMapper, MapperOptions};
-use crate::compute::{Compute, Hurry, Inbox};
+use crate::compute::{Compute, Inbox};
 use crate::convert::cloud;
+use crate::hurry::Hurry;
 use crate::map_output::{MapOutput, epoch};
 use crate::report;
 use crate::start::{Finish, LAST_EVENTS, NodeError, handed_over, open_params};
@@ -56,8 +57,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let (clouds, inputs) = (Losses::default(), Losses::default());
     let update_requests = Arc::new(UpdateRequests::default());
     let max_voxels = Arc::new(AtomicUsize::new(old.voxel_limit()));
-    let mut machine = LatticeMapper::new(settings.mapper, epoch())?;
     let hurry = Hurry::default();
+    let mut machine = LatticeMapper::new(settings.mapper, epoch())?.hurried_by(&hurry);
     let (output, requests) = MapOutput::open(&node, &hurry)?;
     let autosave = Autosave::start(
         settings.autosave,
@@ -380,7 +381,6 @@ impl ComputeState {
         let (clouds, voxels) = (self.machine.counts().clouds_in, self.machine.cells().len());
         let points = self.machine.distortion().points;
         log::info!("{clouds} clouds, {points} points in {voxels} voxels");
-        // Only computed for a report: sorting tens of millions of keys takes a second.
         if self.report_file.is_empty() {
             return;
         }

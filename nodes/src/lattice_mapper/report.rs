@@ -42,10 +42,10 @@ pub struct MapperReport {
     pub rms_m: f64,
     /// Largest distance.
     pub max_distance_m: f64,
-    /// Bytes of the voxels in a keyframe: keys and payloads, without the headers of its chunks.
-    pub map_bytes: usize,
-    /// Checksum of the voxel keys, and of their counts and offsets if kept.
-    pub map_checksum: u64,
+    /// Bytes of the voxels in a keyframe: keys and payloads, without the headers of its chunks. `None` if the node had to hurry.
+    pub map_bytes: Option<usize>,
+    /// Checksum of the voxel keys, and of their counts and offsets if kept. `None` if the node had to hurry.
+    pub map_checksum: Option<u64>,
 }
 
 impl MapperReport {
@@ -60,11 +60,16 @@ impl MapperReport {
         } = mapper.distortion();
         let counts = mapper.counts().clone();
         let cells = mapper.cells();
-        let keys = cells.sorted_keys();
-        let (list, map_checksum) = match &mapper.occupancy {
-            Some(_) => (None, map::changes_sum(&[], &keys)),
-            None => (Some(mapper.list()), mapper.list().checksum()),
+        // A second for tens of millions of voxels.
+        let content = || {
+            let keys = cells.sorted_keys();
+            let (list, checksum) = match &mapper.occupancy {
+                Some(_) => (None, map::changes_sum(&[], &keys)),
+                None => (Some(mapper.list()), mapper.list().checksum()),
+            };
+            (map::voxel_bytes(&keys, list), checksum)
         };
+        let content = (!mapper.hurry.is_requested()).then(content);
         let lattice = cells.lattice();
         Self {
             lattice: lattice.kind().name().to_owned(),
@@ -82,8 +87,8 @@ impl MapperReport {
             mean_distance_m,
             rms_m,
             max_distance_m,
-            map_bytes: map::voxel_bytes(&keys, list),
-            map_checksum,
+            map_bytes: content.map(|(bytes, _)| bytes),
+            map_checksum: content.map(|(_, checksum)| checksum),
         }
     }
 }
@@ -131,8 +136,9 @@ mod tests {
             });
             let bytes: usize = bytes.sum();
             // Each chunk begins with a whole key.
-            let most = report.map_bytes + 10 * chunks.len();
-            assert!((report.map_bytes..=most).contains(&bytes), "{payload:?}");
+            let map_bytes = report.map_bytes.unwrap();
+            let most = map_bytes + 10 * chunks.len();
+            assert!((map_bytes..=most).contains(&bytes), "{payload:?}");
             assert!(chunks.len() > 1);
         }
     }

@@ -9,8 +9,8 @@ use nalgebra::Vector3;
 use rustc_hash::{FxBuildHasher, FxHashMap};
 
 use super::FollowError;
-use crate::compute::{CELLS_BETWEEN_LOOKS, Hurry};
 use crate::convert::map::{self, MapMessageError, VoxelState};
+use crate::hurry::{CELLS_BETWEEN_LOOKS, Hurry};
 
 /// Lattice and voxels of a followed map.
 pub struct FollowedMap {

@@ -14,8 +14,8 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 
 use self::followed_map::Changes;
 use self::incomplete::{Chunks, MAX_WAITING_UPDATES, OpenUpdate, Staging};
-use crate::compute::Hurry;
 use crate::convert::map::{self, History, MapMessageError, VoxelState};
+use crate::hurry::Hurry;
 
 /// Limit of chunks per keyframe or update.
 const MAX_CHUNKS: u32 = 1 << 16;

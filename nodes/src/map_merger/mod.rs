@@ -20,8 +20,8 @@ use serde::Serialize;
 pub use parameters::declare;
 pub use robot_map::{Refusal, RobotMap};
 
-use crate::compute::{CELLS_SORTED, Hurry};
 use crate::convert::{geometry, map};
+use crate::hurry::{CELLS_SORTED, Hurry};
 use crate::map_follower::{FollowError, Followed, MapFollower};
 
 /// Options of a merger.
@@ -84,6 +84,7 @@ pub struct MapMerger {
     sequence: u64,
     history: map::History,
     counts: MergerCounts,
+    hurry: Hurry,
 }
 
 impl MapMerger {
@@ -100,6 +101,7 @@ impl MapMerger {
             sequence: 0,
             history: map::History::default(),
             counts: MergerCounts::default(),
+            hurry: Hurry::default(),
         }
     }
 
@@ -108,6 +110,7 @@ impl MapMerger {
         let of_robots = self.robot_maps.into_iter();
         let hurried = of_robots.map(|robot_map| robot_map.hurried_by(hurry));
         self.robot_maps = hurried.collect();
+        self.hurry = hurry.clone();
         self
     }
 
@@ -295,6 +298,7 @@ impl MapMerger {
         let stamps = self.robot_maps.iter().filter_map(RobotMap::stamp_ns);
         let newest_ns = stamps.max().unwrap_or(0);
         map::MapStamp {
+            hurry: self.hurry.clone(),
             header: geometry::header(&self.options.map_frame, newest_ns),
             epoch: self.epoch,
             sequence: self.sequence,

@@ -12,8 +12,9 @@ use serde::Serialize;
 
 use super::parameters::Settings;
 use super::{MapMerger, MergedLabels, MergerCounts, MergerOptions};
-use crate::compute::{Compute, Hurry};
+use crate::compute::Compute;
 use crate::convert::geometry;
+use crate::hurry::Hurry;
 use crate::map_input::{MapLosses, MapRequests};
 use crate::map_output::{MapOutput, epoch};
 use crate::report;

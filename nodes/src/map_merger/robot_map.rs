@@ -9,7 +9,7 @@ use lattice_msgs::geographic_msgs::GeoPoint;
 use rustc_hash::FxHashSet;
 use thiserror::Error;
 
-use crate::compute::Hurry;
+use crate::hurry::Hurry;
 use crate::map_follower::{FollowedMap, MapFollower};
 
 /// Tolerance of a datum's distance from a lattice point of the merged map, in cell sizes.

@@ -23,9 +23,9 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use self::window::Window;
-use crate::compute::Hurry;
 use crate::convert::geometry;
 use crate::convert::map::VoxelState;
+use crate::hurry::Hurry;
 use crate::map_follower::{FollowError, Followed, FollowedMap, MapFollower};
 
 /// Distance that a robot moves before the grid is made anew without a change of the map, metres.

@@ -232,7 +232,8 @@ impl fmt::Display for RunReport {
                 map.mean_distance_m,
                 map.rms_m,
                 map.max_distance_m,
-                map.map_bytes,
+                map.map_bytes
+                    .map_or_else(String::new, |bytes| bytes.to_string()),
                 markers.marker_bytes
             )?;
         }

@@ -37,9 +37,9 @@ use nalgebra::Isometry3;
 
 use self::headset_scans::HeadsetScans;
 use self::state::{CurrentCalibration, PendingRequest, Running};
-use crate::compute::Hurry;
 use crate::convert::calibration::{result_from, set_pose};
 use crate::convert::geometry;
+use crate::hurry::Hurry;
 use crate::map_follower::{FollowError, Followed, MapFollower};
 
 /// Request number assigned by the node.

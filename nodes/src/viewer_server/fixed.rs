@@ -15,6 +15,7 @@ use super::outbox::Class;
 use super::server::Server;
 use super::thin;
 use crate::convert::map::{History, MapStamp, keyframe};
+use crate::hurry::Hurry;
 
 /// Largest map message, bytes.
 const CHUNK_BYTES: usize = 60_000;
@@ -39,6 +40,7 @@ pub fn serve_labelled(
         broadcaster.offer(channel, info);
     }
     let stamp = MapStamp {
+        hurry: Hurry::default(),
         header: Header {
             frame_id: "map".to_owned(),
             ..Header::default()

@@ -12,8 +12,8 @@ use serde_bytes::ByteBuf;
 
 use super::map_stream::Entry;
 use super::thin;
-use crate::compute::Hurry;
 use crate::convert::map::{History, KEY_ENCODING, VoxelState, sign};
+use crate::hurry::Hurry;
 use crate::map_follower::{FollowError, Followed, FollowedMap, MapFollower};
 
 /// Voxels per message: some 60 kB with labels.

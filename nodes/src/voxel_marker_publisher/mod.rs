@@ -23,7 +23,7 @@ use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
 use serde::{Deserialize, Serialize};
 
 use self::blocks::{BlockId, Blocks};
-use crate::compute::{CELLS_SORTED, Hurry};
+use crate::hurry::{CELLS_SORTED, Hurry};
 use crate::map_follower::{FollowError, Followed, MapFollower};
 
 /// Namespace of all markers.

@@ -8,7 +8,8 @@ use lattice_msgs::visualization_msgs::MarkerArray;
 
 use super::parameters::Settings;
 use super::{MarkerOptions, MarkerReport, VoxelMarkers};
-use crate::compute::{Compute, Hurry};
+use crate::compute::Compute;
+use crate::hurry::Hurry;
 use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
 use crate::start::{Finish, LAST_EVENTS, LAST_FLUSH, NodeError, handed_over, open_params};

@@ -20,6 +20,7 @@ use lattice_nodes::convert::map::{History, MapStamp, keyframe, sign, update};
 use lattice_nodes::convert::semantic::{SemanticOptions, semantic_from_message};
 use lattice_nodes::enu_transformer::ins::{InsMessage, InsSource};
 use lattice_nodes::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptions};
+use lattice_nodes::hurry::Hurry;
 use lattice_nodes::map_follower::MapFollower;
 use nalgebra::Vector3;
 use serde_bytes::ByteBuf;
@@ -231,6 +232,7 @@ pub fn follower_seeds() -> Vec<Vec<u8>> {
             offsets_m: (0..8).map(|i| [x, 0.5 * i as f32, 0.0]).collect(),
         };
         let stamp = |sequence, history| MapStamp {
+            hurry: Hurry::default(),
             header: Header::default(),
             epoch: 1,
             sequence,

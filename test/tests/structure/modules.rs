@@ -15,7 +15,7 @@ const LAYERS: [(&str, &str); 3] = [
     ),
     (
         "nodes/src",
-        "octree files convert mesh stamps start report compute options cloud_input map_follower map_input map_output camera segmenter semantic_cloud headset_cloud enu_transformer lidar_odometry lattice_mapper map_merger map_projector \
+        "hurry octree files convert mesh stamps start report compute options cloud_input map_follower map_input map_output camera segmenter semantic_cloud headset_cloud enu_transformer lidar_odometry lattice_mapper map_merger map_projector \
          voxel_marker_publisher semantic_icp_server viewer_server replay running executables bag_player bag_recorder",
     ),
     (

@@ -41,7 +41,8 @@ impl Payloads {
     }
 }
 
-/// Keyframe of a list as self-contained chunks; an empty list is one chunk without voxels.
+/// Keyframe of a list as self-contained chunks; an empty list is one chunk without voxels. None if the node has to end
+/// before they are made.
 pub fn keyframe(list: &VoxelList, stamp: &MapStamp) -> Vec<LatticeMap> {
     let voxels = list.sorted();
     let keys: Vec<MortonKey> = voxels.iter().map(|(key, _)| *key).collect();
@@ -94,7 +95,12 @@ fn keyframe_of_parts(
             history_checksum: stamp.history.0,
         }
     };
-    (0..).zip(parts).map(chunk).collect()
+    let chunks = (0..).zip(parts).map(chunk);
+    let mut chunks: Vec<_> = chunks.take_while(|_| !stamp.hurry.is_requested()).collect();
+    if chunks.len() < parts.len() {
+        chunks.clear();
+    }
+    chunks
 }
 
 /// Update since `previous_sequence` with the state of each changed voxel, in chunks.

@@ -17,6 +17,7 @@ pub use chunks::{keyframe, keyframe_of_cells, update, update_of_cells, voxel_byt
 pub use voxels::{VoxelColumns, VoxelState, keys_from, main_label, voxels_from};
 
 use super::geometry;
+use crate::hurry::Hurry;
 
 /// Supported key encoding: Morton-sorted 21-bit indices, LEB128 varints of differences.
 pub const KEY_ENCODING: &str = "morton21_delta_leb128";
@@ -82,6 +83,8 @@ pub struct MapStamp<'a> {
     pub origin: Option<&'a GeoPoint>,
     /// Largest serialized chunk, bytes.
     pub chunk_bytes: usize,
+    /// Request to leave a keyframe out.
+    pub hurry: Hurry,
 }
 
 /// Lattice, its frame and the epoch as a message: the generator is in the

@@ -13,6 +13,7 @@ fn info(list: &VoxelList) -> LatticeInfo {
         sequence: 0,
         history: History::default(),
         origin: None,
+        hurry: Hurry::default(),
         chunk_bytes: 60_000,
     };
     info_of(list.lattice(), list.datum_m(), &stamp)

@@ -2,7 +2,7 @@
 
 use lattice_core::lattice::LatticeKind;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
-use lattice_nodes::compute::Hurry;
+use lattice_nodes::hurry::Hurry;
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::map_follower::{Followed, MapFollower};
 use lattice_test::maps::{self, follow_keyframe, follow_update, insert};
