@@ -6,6 +6,7 @@ mod blocks;
 mod color;
 pub mod node;
 mod options;
+mod packer;
 mod parameters;
 mod shape;
 
@@ -16,20 +17,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use lattice_core::lattice::MortonKey;
 use lattice_msgs::cdr;
-use lattice_msgs::geometry_msgs::Pose;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
 use serde::{Deserialize, Serialize};
 
 use self::blocks::{BlockId, Blocks};
+use self::packer::{NAMESPACE, Packer, bare, marker_bytes};
 use crate::hurry::{CELLS_SORTED, Hurry};
 use crate::map_follower::{FollowError, Followed, MapFollower};
-
-/// Namespace of all markers.
-const NAMESPACE: &str = "voxels";
-/// Serialized bytes of a marker besides points and colours, and of an array besides its markers.
-const OVERHEAD_BYTES: usize = 256;
 
 /// Number of changed voxels that are placed at once: some 50 ms.
 const PLACED_AT_ONCE: usize = 1 << 17;
@@ -87,6 +83,8 @@ pub struct VoxelMarkers {
     options: MarkerOptions,
     follower: MapFollower,
     blocks: Blocks,
+    /// True while nothing is drawn.
+    resting: bool,
     /// Changed voxels that are not in the blocks yet.
     unplaced: Vec<MortonKey>,
     dirty: BTreeSet<BlockId>,
@@ -109,6 +107,7 @@ impl VoxelMarkers {
         Self {
             follower: MapFollower::new(options.max_voxels),
             blocks: Blocks::new(options.block_bits),
+            resting: false,
             unplaced: Vec::new(),
             dirty: BTreeSet::new(),
             drawn: BTreeMap::new(),
@@ -192,8 +191,39 @@ impl VoxelMarkers {
         self.dirty.len()
     }
 
+    /// Draws nothing until [`VoxelMarkers::wake`].
+    pub fn rest(&mut self) {
+        self.resting = true;
+        self.forget();
+    }
+
+    /// Draws the whole map after [`VoxelMarkers::rest`].
+    pub fn wake(&mut self) {
+        if std::mem::take(&mut self.resting) {
+            let map = self.follower.map().into_iter();
+            self.unplaced = map.flat_map(|map| map.voxels().keys()).copied().collect();
+        }
+    }
+
+    /// True between [`VoxelMarkers::rest`] and [`VoxelMarkers::wake`].
+    pub fn is_resting(&self) -> bool {
+        self.resting
+    }
+
+    /// Forgets what was drawn.
+    fn forget(&mut self) {
+        self.blocks = Blocks::new(self.options.block_bits);
+        self.unplaced = Vec::new();
+        self.drawn.clear();
+        self.dirty.clear();
+        self.wipe = true;
+    }
+
     /// True if there are changes to publish.
     pub fn is_dirty(&self) -> bool {
+        if self.resting {
+            return false;
+        }
         let has_changes = !self.dirty.is_empty() || !self.unplaced.is_empty();
         self.follower.map().is_some() && (self.wipe || has_changes)
     }
@@ -309,11 +339,10 @@ impl VoxelMarkers {
             return result;
         }
         if replaced {
-            self.blocks = Blocks::new(self.options.block_bits);
-            self.unplaced.clear();
-            self.drawn.clear();
-            self.dirty.clear();
-            self.wipe = true;
+            self.forget();
+        }
+        if self.resting {
+            return result;
         }
         self.unplaced.extend(touched);
         // A keyframe waits until it is drawn, and its changes until then.
@@ -326,63 +355,5 @@ impl VoxelMarkers {
             self.redraw();
         }
         result
-    }
-}
-
-/// Delete marker without points.
-fn bare(header: &Header, id: i32, action: i32) -> Marker {
-    let mut pose = Pose::default();
-    pose.orientation.w = 1.0;
-    Marker {
-        header: header.clone(),
-        ns: NAMESPACE.to_owned(),
-        id,
-        action,
-        pose,
-        ..Marker::default()
-    }
-}
-
-/// Serialized bytes of a marker, rounded up.
-fn marker_bytes(marker: &Marker) -> usize {
-    OVERHEAD_BYTES
-        + marker.header.frame_id.len()
-        + marker.points.len() * 24
-        + marker.colors.len() * 16
-}
-
-/// Packs markers into arrays of bounded size.
-struct Packer {
-    chunk_bytes: usize,
-    open: MarkerArray,
-    open_bytes: usize,
-    total_bytes: usize,
-}
-
-impl Packer {
-    fn new(chunk_bytes: usize) -> Self {
-        Self {
-            chunk_bytes,
-            open: MarkerArray::default(),
-            open_bytes: 0,
-            total_bytes: 0,
-        }
-    }
-
-    fn push(&mut self, marker: Marker, arrays: &mut Vec<MarkerArray>) {
-        let bytes = marker_bytes(&marker);
-        if self.open_bytes + bytes > self.chunk_bytes {
-            self.finish(arrays);
-        }
-        self.open_bytes += bytes;
-        self.total_bytes += bytes;
-        self.open.markers.push(marker);
-    }
-
-    fn finish(&mut self, arrays: &mut Vec<MarkerArray>) {
-        if !self.open.markers.is_empty() {
-            arrays.push(std::mem::take(&mut self.open));
-        }
-        self.open_bytes = 0;
     }
 }

@@ -119,8 +119,14 @@ impl ComputeState {
     }
 
     /// Publishes changed blocks once the previous markers are acknowledged. Until then changes accumulate, and a
-    /// block with many changes is sent once.
+    /// block with many changes is sent once. Nothing is drawn without a subscriber.
     fn draw(&mut self) {
+        if self.markers.subscriber_count() == 0 {
+            self.waits_since = None;
+            self.machine.rest();
+            return;
+        }
+        self.machine.wake();
         if !self.markers.is_acknowledged() {
             self.waits_since.get_or_insert_with(Instant::now);
             return;
@@ -150,6 +156,9 @@ impl ComputeState {
                 (Level::Warn, text)
             }
             (0, ..) => (Level::Warn, "no map yet".to_owned()),
+            (_, 0, None) if self.machine.is_resting() => {
+                (Level::Ok, "nobody subscribes to voxel_markers".to_owned())
+            }
             (_, 0, None) if lost > 0 => {
                 let text =
                     format!("{lost} arrays not published: the queue is full; lower block_bits");

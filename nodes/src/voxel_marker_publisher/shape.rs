@@ -6,8 +6,9 @@ use lattice_msgs::visualization_msgs::Marker;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::blocks::{BlockId, Blocks, offset};
+use super::color;
 use super::options::{ColorBy, MarkerOptions, MarkerStyle};
-use super::{OVERHEAD_BYTES, color};
+use super::packer::OVERHEAD_BYTES;
 use crate::convert::geometry;
 use crate::map_follower::FollowedMap;
 

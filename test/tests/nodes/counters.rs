@@ -11,6 +11,7 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use lattice_msgs::lattice::{ClearBoxRequest, LatticeMap, LatticeMapUpdate};
 use lattice_msgs::sensor_msgs::{Imu, PointCloud2};
+use lattice_msgs::visualization_msgs::MarkerArray;
 use lattice_nodes::executables;
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::start::Finish;
@@ -207,6 +208,12 @@ fn a_merger_counts_what_it_refuses_and_has_no_room_for() {
 #[test]
 fn a_marker_publisher_counts_messages_gaps_and_markers() {
     let node = Driven::start("voxel_marker_publisher", "markers", &["rate_hz:=20.0"]);
+    // Markers that nobody subscribes to are not drawn.
+    let (shared, viewer) = (SubscriptionExecutor::Shared, |_: Arc<MarkerArray>| {});
+    let viewer = node
+        .world
+        .subscribe("voxel_markers", Qos::MARKERS, shared, viewer);
+    let _viewer = viewer.unwrap();
     let mut machine = VoxelMarkers::new(MarkerOptions::default());
     let mut mapper = mapper([0.0; 3], &scatter(1, 500, [0.0; 3], 9.0));
     mapper.take_update();

@@ -7,6 +7,7 @@ use lattice_core::voxels::VoxelStore;
 use lattice_msgs::cdr;
 use lattice_msgs::geometry_msgs::Point;
 use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
+use lattice_nodes::hurry::Hurry;
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::voxel_marker_publisher::{MarkerOptions, MarkerStyle, VoxelMarkers};
 use lattice_test::clouds::cloud;
@@ -102,30 +103,53 @@ fn line(n: usize, step: f32) -> Vec<[f32; 3]> {
     (0..n).map(|i| [i as f32 * step, 0.1, 0.2]).collect()
 }
 
-/// A large change that is interrupted is drawn as one that is not.
+/// Cells of a plane.
+fn plane(count: i32) -> Vec<[f32; 3]> {
+    let cell = |i: i32| [i % 400, i / 400, 0].map(|v| v as f32 + 0.25);
+    (0..count).map(cell).collect()
+}
+
 #[test]
-fn a_large_map_waits_to_be_drawn_and_loses_nothing() {
-    let cells: Vec<[f32; 3]> = (0..150_000)
-        .map(|i| [i % 400, i / 400, 0].map(|v| v as f32 + 0.25))
-        .collect();
-    let [mut interrupted, mut whole] = [0; 2].map(|_| {
-        let mut bench = Bench::new(LatticeKind::Cubic, MarkerOptions::default());
-        bench.mapper.on_cloud(&cloud("map", 1, &cells)).unwrap();
-        bench.mapper.take_update();
-        for chunk in bench.mapper.keyframe() {
-            bench.markers.on_map(&chunk).unwrap();
+fn a_publisher_that_has_to_end_draws_nothing_and_names_the_rest() {
+    let hurry = Hurry::default();
+    let mut bench = Bench::new(LatticeKind::Cubic, MarkerOptions::default());
+    bench.markers = bench.markers.hurried_by(&hurry);
+    let cells = plane(150_000);
+    bench.mapper.on_cloud(&cloud("map", 1, &cells)).unwrap();
+    for chunk in bench.mapper.take_update() {
+        bench.markers.on_update(&chunk).unwrap();
+    }
+    let waiting = bench.markers.unplaced();
+    assert!(waiting > 0 && bench.markers.is_dirty());
+    hurry.request();
+    assert!(bench.markers.take_arrays(1 << 20).is_empty());
+    assert_eq!(bench.markers.unplaced(), waiting);
+}
+
+/// What changed while nothing was drawn is drawn with the rest of the map.
+#[test]
+fn a_publisher_that_rested_draws_the_whole_map() {
+    let options = MarkerOptions::default();
+    let [mut rested, mut always] = [0; 2].map(|_| Bench::new(LatticeKind::Fcc, options.clone()));
+    for (step, count) in [(0, 100), (1, 5000), (2, 7000)] {
+        if step == 1 {
+            rested.markers.rest();
         }
-        bench
-    });
-    let looks = std::cell::Cell::new(0);
-    let is_over = || looks.replace(looks.get() + 1) > 3;
-    let arrays = interrupted.markers.take_arrays_until(1 << 20, &is_over);
-    assert!(arrays.is_empty());
-    let unplaced = interrupted.markers.unplaced();
-    assert!(unplaced > 0 && unplaced < 150_000 && interrupted.markers.is_dirty());
-    assert!(interrupted.draw() == whole.draw());
-    assert_eq!(interrupted.markers.unplaced(), 0);
-    assert!(interrupted.shown_points() > 0);
+        let drawn = rested.insert(&plane(count));
+        assert_eq!(drawn.is_empty(), step > 0);
+        always.insert(&plane(count));
+    }
+    rested.markers.wake();
+    rested.draw();
+    let points = always.shown_points();
+    assert!(points > 0);
+    assert_eq!(rested.shown_points(), points);
+    // Both go on alike.
+    for bench in [&mut rested, &mut always] {
+        bench.insert(&plane(9000));
+        assert!(bench.shown_points() > points);
+    }
+    assert_eq!(rested.shown_points(), always.shown_points());
 }
 
 #[test]

@@ -232,6 +232,11 @@ fn followers_in_the_middle_of_a_map_end_in_time() {
     let domain = LoopbackDomain::take().unwrap();
     let runtime = peer(&domain);
     let node = runtime.node("peer").unwrap();
+    // Markers that nobody subscribes to are not drawn.
+    let drawn = |_: Arc<MarkerArray>| {};
+    let dedicated = SubscriptionExecutor::Dedicated;
+    let markers = node.subscribe("/robot/voxel_markers", Qos::MARKERS, dedicated, drawn);
+    let _markers = markers.unwrap();
     let map_dir = format!("map_dir:={}", folder.path().display());
     let of_cubes = ["lattice:=cubic", "cell_volume_m3:=1.0", "resume:=true"];
     let params = [&of_cubes[..], &[&map_dir]].concat();

@@ -1,7 +1,7 @@
 //! Voxels split into messages of bounded size.
 
 use lattice_core::lattice::{Lattice, MortonKey};
-use lattice_core::voxels::{Changes, Voxel, VoxelList, codec};
+use lattice_core::voxels::{Changes, Voxel, VoxelList, VoxelStore, codec};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use nalgebra::Vector3;
 use serde_bytes::ByteBuf;
@@ -26,15 +26,13 @@ struct Payloads {
 }
 
 impl Payloads {
-    fn of<'a>(
-        list: &VoxelList,
-        keys: &[MortonKey],
-        voxels: impl Iterator<Item = &'a Voxel> + Clone,
-    ) -> Self {
+    fn of(list: &VoxelList, keys: &[MortonKey]) -> Self {
+        let voxel = |key: &MortonKey| list.get(*key).unwrap_or_default();
+        let voxels: Vec<Voxel> = keys.iter().map(voxel).collect();
         let (labels, label_counts) = labels_of(list, keys);
         Self {
-            counts: voxels.clone().map(|voxel| voxel.count).collect(),
-            mean_offsets: mean_offsets(voxels, offset_unit_m(list.lattice())),
+            counts: voxels.iter().map(|voxel| voxel.count).collect(),
+            mean_offsets: mean_offsets(voxels.iter(), offset_unit_m(list.lattice())),
             labels,
             label_counts,
         }
@@ -44,15 +42,10 @@ impl Payloads {
 /// Keyframe of a list as self-contained chunks; an empty list is one chunk without voxels. None if the node has to end
 /// before they are made.
 pub fn keyframe(list: &VoxelList, stamp: &MapStamp) -> Vec<LatticeMap> {
-    let voxels = list.sorted();
-    let keys: Vec<MortonKey> = voxels.iter().map(|(key, _)| *key).collect();
+    let keys = list.sorted_keys();
     let parts = split(&keys, payload_bytes(list), stamp.chunk_bytes);
-    let mut rest = voxels.as_slice();
-    keyframe_of_parts(list.lattice(), list.datum_m(), &parts, stamp, |keys| {
-        let (voxels, tail) = rest.split_at(keys.len().min(rest.len()));
-        rest = tail;
-        Payloads::of(list, keys, voxels.iter().map(|(_, voxel)| voxel))
-    })
+    let payloads = |keys: &[MortonKey]| Payloads::of(list, keys);
+    keyframe_of_parts(list.lattice(), list.datum_m(), &parts, stamp, payloads)
 }
 
 /// Keyframe of cells without payload.
@@ -71,7 +64,7 @@ fn keyframe_of_parts(
     datum_m: Vector3<f64>,
     parts: &[&[MortonKey]],
     stamp: &MapStamp,
-    mut payloads: impl FnMut(&[MortonKey]) -> Payloads,
+    payloads: impl Fn(&[MortonKey]) -> Payloads,
 ) -> Vec<LatticeMap> {
     let info = info_of(lattice, datum_m, stamp);
     let total: usize = parts.iter().map(|keys| keys.len()).sum();
@@ -111,11 +104,7 @@ pub fn update(
     stamp: &MapStamp,
 ) -> Vec<LatticeMapUpdate> {
     let (place, bytes) = ((list.lattice(), list.datum_m()), payload_bytes(list));
-    let payloads = |keys: &[MortonKey]| {
-        let voxel = |key: &MortonKey| list.get(*key).unwrap_or_default();
-        let voxels: Vec<Voxel> = keys.iter().map(voxel).collect();
-        Payloads::of(list, keys, voxels.iter())
-    };
+    let payloads = |keys: &[MortonKey]| Payloads::of(list, keys);
     update_of_parts(place, changes, bytes, previous_sequence, stamp, payloads)
 }
 
