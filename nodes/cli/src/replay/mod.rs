@@ -1,5 +1,6 @@
 //! `lattice replay`: maps from a log.
 
+mod depth;
 pub mod node_process;
 mod params;
 mod processes;
@@ -19,7 +20,9 @@ use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::enu_transformer::ins::InsSource;
 use lattice_nodes::files::atomic_write;
 use lattice_nodes::lattice_mapper::MapperOptions;
-use lattice_nodes::replay::{self, Pipeline, RunReport, Slice, TopicPlan, TopicWishes};
+use lattice_nodes::replay::{
+    self, CameraWishes, DepthClouds, Pipeline, RunReport, Slice, TopicPlan, TopicWishes,
+};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_runtime::LoopbackDomain;
 use processes::DdsReplay;
@@ -52,7 +55,7 @@ pub struct Replay {
     /// One parameter, as in `-p ins.source:=odometry`
     #[arg(short = 'p', long = "param", value_name = "NAME:=VALUE")]
     pub param: Vec<String>,
-    /// Cloud topics; by default detected in the log
+    /// Topics of clouds or depth images; by default detected in the log
     #[arg(long, value_name = "TOPIC")]
     pub points: Vec<String>,
     /// Source of poses: odometry, inspvax, inspva, navsatfix_imu, pose, pose_with_covariance, or tf (transforms
@@ -200,6 +203,10 @@ impl Replay {
         }
         let markers = MarkerOptions::from_params(&self.params_of("voxel_marker_publisher")?)?;
         let mut pipeline = Pipeline::new(transformer, maps, &markers)?;
+        if !plan.cameras.is_empty() {
+            let params = self.params_of("semantic_cloud")?;
+            pipeline.set_depth_clouds(DepthClouds::new(bag, plan, &params)?);
+        }
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads)
             .build()?;
@@ -227,6 +234,9 @@ impl Replay {
         let plan = replay::plan(bag, &self.wishes()?)?;
         for line in &plan.choices {
             eprintln!("{line}");
+        }
+        if plan.cameras.is_empty() {
+            self.check_names_of_clouds()?;
         }
         Ok(plan)
     }
@@ -308,6 +318,7 @@ impl Replay {
             ins,
             map_frame: frame("map_frame")?,
             base_frame: frame("base_frame")?,
+            cameras: CameraWishes::from_params(&self.params_of("semantic_cloud")?)?,
             ..TopicWishes::default()
         })
     }
