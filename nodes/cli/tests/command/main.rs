@@ -7,6 +7,7 @@ mod beside_nav2;
 mod browser;
 mod calibrate;
 mod demo;
+mod depth_logs;
 mod doctor;
 mod driver_logs;
 mod evaluate;
