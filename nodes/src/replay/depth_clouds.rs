@@ -176,3 +176,117 @@ impl Machine {
         clouds.map(move |points| (Arc::clone(&topic), points))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::convert::geometry::header;
+    use crate::segmenter::{Network, Scores, SegmenterOptions, Size, Values};
+    use crate::semantic_cloud::CloudOptions;
+    use lattice_msgs::sensor_msgs::{CameraInfo, Image};
+    use serde::Serialize;
+
+    /// A network of two pixels, of the classes 3 and 4.
+    struct Two([String; 0]);
+
+    const TWO: Size = Size {
+        width: 2,
+        height: 1,
+    };
+
+    impl Network for Two {
+        fn input(&self) -> Size {
+            TWO
+        }
+
+        fn names(&self) -> &[String] {
+            &self.0
+        }
+
+        fn run(&self, _: Vec<f32>) -> Result<Scores, String> {
+            Ok(Scores {
+                size: TWO,
+                values: Values::Classes(vec![3, 4]),
+            })
+        }
+    }
+
+    fn image(stamp_ns: i64, encoding: &str, data: &[u8]) -> Vec<u8> {
+        let image = Image {
+            header: header("camera", stamp_ns),
+            width: 2,
+            height: 1,
+            encoding: encoding.to_owned(),
+            step: data.len() as u32,
+            data: data.to_vec().into(),
+            ..Image::default()
+        };
+        bytes(&image)
+    }
+
+    fn bytes(message: &impl Serialize) -> Vec<u8> {
+        cdr::to_vec(message).unwrap()
+    }
+
+    #[test]
+    fn a_network_labels_each_image_of_colours() {
+        let inputs = [CameraInput::Depth, CameraInput::Info, CameraInput::Color];
+        let camera = DepthCamera {
+            depth: 0,
+            inputs: inputs.into_iter().enumerate().collect(),
+        };
+        let options = CloudOptions {
+            labels: LabelSource::Image,
+            ..CloudOptions::default()
+        };
+        let network = Segmenter::new(SegmenterOptions::default(), Box::new(Two([])));
+        let mut cameras = DepthClouds(vec![Machine {
+            camera,
+            topic: "/depth".into(),
+            machine: SemanticCloud::new(options),
+            network: Some(network),
+        }]);
+        let info = CameraInfo {
+            width: 2,
+            height: 1,
+            k: [1.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            ..CameraInfo::default()
+        };
+        assert!(cameras.on_message(1, &bytes(&info)).unwrap().is_empty());
+        let mut clouds = Vec::new();
+        for stamp_ns in 1..=5 {
+            let depth = image(stamp_ns, "16UC1", &[232, 3, 232, 3]);
+            assert!(cameras.on_message(0, &depth).unwrap().is_empty());
+            let color = image(stamp_ns, "rgb8", &[1, 2, 3, 4, 5, 6]);
+            clouds.extend(cameras.on_message(2, &color).unwrap());
+        }
+        // Its colours are of no other time, and another topic is not of the camera.
+        let late = image(9_000_000_000, "16UC1", &[232, 3, 232, 3]);
+        assert!(cameras.on_message(0, &late).unwrap().is_empty());
+        assert!(cameras.on_message(7, &late).unwrap().is_empty());
+        assert!(cameras.on_message(0, &late[..20]).is_err());
+        assert_eq!(clouds.len(), 5);
+        for (topic, cloud) in &clouds {
+            assert_eq!((&**topic, cloud.width, cloud.height), ("/depth", 2, 1));
+            let fields: Vec<&str> = cloud.fields.iter().map(|f| f.name.as_str()).collect();
+            assert!(
+                fields.contains(&"label") && fields.contains(&"rgb"),
+                "{fields:?}"
+            );
+        }
+        assert!(cameras.finish().is_empty());
+        let [report] = &cameras.reports()[..] else {
+            panic!()
+        };
+        assert_eq!(
+            (
+                report.left_out(),
+                report.clouds.counts.points.points_unlabelled
+            ),
+            (1, 0)
+        );
+        assert_eq!(report.clouds.counts.dropped["depth_no_partner"], 1);
+        assert_eq!(report.clouds.network.as_ref().unwrap().labels_out, 5);
+        assert!(report.cause_of_nothing().is_none());
+    }
+}

@@ -20,6 +20,7 @@ pub use crate::camera::{
 };
 pub use counts::{CloudCounts, CloudReport, PointCounts};
 pub use options::{CloudOptions, LabelSource};
+#[cfg(feature = "bags")]
 pub(crate) use parameters::Settings;
 pub use parameters::declare;
 pub use project::PointOptions;

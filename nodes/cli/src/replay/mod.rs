@@ -28,8 +28,8 @@ use lattice_runtime::LoopbackDomain;
 use processes::DdsReplay;
 pub use processes::{param, quoted, yaml_text};
 
-/// Limit of lattices in a replay over DDS: each needs two of the twelve participants on loopback.
-const MAX_LOOPBACK_LATTICES: usize = 5;
+/// Participants on loopback beside the player and the transformer: a lattice needs two of them, a depth camera one.
+const MAX_LOOPBACK_NODES: usize = 10;
 
 /// Map a rosbag2 log
 #[derive(Args, Clone, Debug, Default)]
@@ -162,11 +162,13 @@ impl Replay {
             return self.replay_planned(&bag, &plan);
         }
         let lattices: Vec<_> = self.maps()?.into_iter().map(|map| map.lattice).collect();
-        if lattices.len() > MAX_LOOPBACK_LATTICES {
+        let cameras = plan.cameras.len();
+        let most = MAX_LOOPBACK_NODES.saturating_sub(cameras) / 2;
+        if lattices.len() > most {
             let count = lattices.len();
             return Err(format!(
-                "{count} lattices over DDS on loopback: at most \
-                 {MAX_LOOPBACK_LATTICES} are possible; use --direct"
+                "{count} lattices over DDS on loopback: at most {most} are possible with {cameras} depth cameras; \
+                 use --direct"
             )
             .into());
         }
