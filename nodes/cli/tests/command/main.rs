@@ -16,6 +16,7 @@ mod health;
 mod indoor;
 mod lifecycle;
 mod map;
+mod map_save;
 mod merger;
 mod names;
 mod nodes;
