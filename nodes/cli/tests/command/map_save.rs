@@ -49,11 +49,17 @@ fn a_running_mapper_writes_its_map_on_request() {
 
     let (output, said) = save(&domain, &["/lattice_mapper", "../other.lattice"]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(said.contains("/lattice_mapper: ") && said.contains("other.lattice"), "{said}");
+    assert!(
+        said.contains("/lattice_mapper: ") && said.contains("other.lattice"),
+        "{said}"
+    );
     let (output, said) = save(&domain, &["/nobody", "a", "--timeout", "1"]);
     assert_eq!(output.status.code(), Some(1));
     let remedy = "--from names a running node with save_map";
-    assert!(said.contains("/nobody/save_map") && said.contains(remedy), "{said}");
+    assert!(
+        said.contains("/nobody/save_map") && said.contains(remedy),
+        "{said}"
+    );
     signal(&mapper, "-INT");
     assert!(mapper.wait_timeout(PATIENCE).unwrap().unwrap().success());
 }
