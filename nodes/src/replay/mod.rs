@@ -2,7 +2,11 @@
 //!
 //! Messages pass in the order of the log, so the map depends on nothing else.
 
+mod camera_report;
+mod cameras;
+mod depth_clouds;
 mod disorder;
+mod images;
 mod packets;
 mod plan;
 mod poses;
@@ -12,6 +16,9 @@ mod statics;
 mod survey;
 mod topics;
 
+pub use camera_report::CameraReport;
+pub use cameras::{CameraInput, CameraWishes, DepthCamera};
+pub use depth_clouds::{DepthClouds, QUEUE_SIZE};
 pub use plan::{TopicPlan, TopicWishes, plan};
 pub use report::{LatticeReport, RunReport};
 pub use scan_poses::{OdometryInput, ScanPosesReport, feed_odometry};
@@ -30,18 +37,23 @@ use lattice_msgs::novatel_oem7_msgs::{INSPVA, INSPVAX};
 use lattice_msgs::sensor_msgs::{Imu, NavSatFix};
 use lattice_msgs::tf2_msgs::TFMessage;
 
+use depth_clouds::DepthCloud;
+
 use crate::enu_transformer::ins::InsMessage;
 use crate::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptions, TransformerReport};
 use crate::lattice_mapper::{LatticeMapper, MapperOptions, MapperReport};
 use crate::lidar_odometry::LidarOdometryOptions;
 use crate::voxel_marker_publisher::{MarkerOptions, MarkerReport, VoxelMarkers};
 use lattice_bag::{BagMessage, BagReader, ReadOptions};
+use lattice_runtime::params::Params;
 use scan_poses::ScanPoses;
 
 /// Epoch of maps that come from a replay: the same log gives the same bytes.
 const EPOCH: u64 = 1;
 /// Poses and transforms behind a slice that its last clouds may wait for.
 const POSES_BEHIND_NS: i64 = 10_000_000_000;
+/// Labels and colours before a slice that its first depth images may be matched with.
+const COMPANIONS_BEFORE_NS: i64 = 1_000_000_000;
 /// Part of the progress that is of odometry, where poses come from it: it takes four fifths of the time.
 const ODOMETRY_PART: f64 = 0.8;
 /// Time between two updates of the map to its followers, in log time.
@@ -50,6 +62,7 @@ const UPDATE_PERIOD_NS: i64 = 1_000_000_000;
 /// The machines of a replay: one transformer, any number of maps with their markers.
 pub struct Pipeline {
     transformer: EnuTransformer,
+    depth_clouds: Option<DepthClouds>,
     branches: Vec<Branch>,
     undecodable: u64,
     next_update_ns: Option<i64>,
@@ -78,11 +91,17 @@ impl Pipeline {
         };
         Ok(Self {
             transformer: EnuTransformer::new(transformer),
+            depth_clouds: None,
             branches: maps.into_iter().map(branch).collect::<Result<_, _>>()?,
             undecodable: 0,
             next_update_ns: None,
             origin: None,
         })
+    }
+
+    /// Sets the machines of depth cameras; by default they have the default parameters.
+    pub fn set_depth_clouds(&mut self, depth_clouds: DepthClouds) {
+        self.depth_clouds = Some(depth_clouds);
     }
 
     /// Passes one message of a topic of the log through all machines.
@@ -110,6 +129,9 @@ impl Pipeline {
 
     /// Ends the input and sums up.
     pub fn finish(&mut self) -> RunReport {
+        let clouds = self.depth_clouds.as_mut().map(DepthClouds::finish);
+        let outputs = self.transform_all(clouds.unwrap_or_default(), i64::MAX);
+        self.map(outputs);
         let outputs = self.transformer.finish();
         self.map(outputs);
         self.update();
@@ -125,6 +147,7 @@ impl Pipeline {
                 attitude: self.transformer.attitude(),
                 ..TransformerReport::default()
             },
+            cameras: { self.depth_clouds.as_ref() }.map_or(Vec::new(), DepthClouds::reports),
             lattices,
             origin: self
                 .origin
@@ -163,6 +186,10 @@ impl Pipeline {
     ) -> Result<Vec<EnuOutput>, CdrError> {
         let now_ns = message.log_time_ns;
         let data = &message.data;
+        if let (Role::Camera(_), Some(cameras)) = (role, &mut self.depth_clouds) {
+            let clouds = cameras.on_message(message.topic, data)?;
+            return Ok(self.transform_all(clouds, now_ns));
+        }
         let machine = &mut self.transformer;
         let mut ins = |message: InsMessage| machine.on_ins(topic, message, now_ns);
         Ok(match role {
@@ -185,8 +212,16 @@ impl Pipeline {
                 ins(InsMessage::PoseWithCovariance(&cdr::from_slice(data)?))
             }
             Role::Ins(Odometry::TYPE) => ins(InsMessage::Odometry(&cdr::from_slice(data)?)),
-            Role::Ins(_) => Vec::new(),
+            Role::Ins(_) | Role::Camera(_) => Vec::new(),
         })
+    }
+
+    /// Passes clouds of depth cameras to the transformer.
+    fn transform_all(&mut self, clouds: Vec<DepthCloud>, now_ns: i64) -> Vec<EnuOutput> {
+        let clouds = clouds.into_iter();
+        let outputs =
+            clouds.flat_map(|(topic, cloud)| self.transformer.on_cloud(&topic, cloud, now_ns));
+        outputs.collect()
     }
 
     fn map(&mut self, outputs: Vec<EnuOutput>) {
@@ -303,6 +338,10 @@ pub fn run(
         ..ReadOptions::default()
     };
     pipeline.transformer.expect_delay(plan.pose_delay_ns);
+    if pipeline.depth_clouds.is_none() && !plan.cameras.is_empty() {
+        let params = Params::from_values::<String>("/semantic_cloud", []);
+        pipeline.set_depth_clouds(DepthClouds::new(bag, plan, &params)?);
+    }
     let mut clouds = 0;
     if !plan.late_statics.transforms.is_empty() {
         pipeline.hold(&plan.late_statics, start_ns);
@@ -328,7 +367,9 @@ pub fn run(
             let role = plan.roles.get(&message.topic).copied();
             let is_cloud = role.is_some_and(Role::is_cloud);
             let behind = is_cloud && message.log_time_ns >= to_ns;
-            if let Some(role) = role.filter(|_| !behind) {
+            let is_early = message.log_time_ns < from_ns.saturating_sub(COMPANIONS_BEFORE_NS);
+            let is_left_out = behind || is_early && role.is_some_and(Role::is_companion);
+            if let Some(role) = role.filter(|_| !is_left_out) {
                 clouds += u64::from(is_cloud);
                 let topic = bag.topics().get(message.topic);
                 let topic = topic.map_or("", |topic| topic.name.as_str());

@@ -6,6 +6,7 @@ use lattice_bag::{BagReader, TopicInfo};
 use lattice_msgs::RosMessage;
 use lattice_msgs::tf2_msgs::TFMessage;
 
+use super::cameras::{self, CameraWishes, Cameras, DepthCamera};
 use super::disorder;
 use super::packets;
 use super::poses::{Log, Poses};
@@ -28,8 +29,10 @@ pub struct TopicWishes {
     pub map_frame: Option<String>,
     /// Frame of the machine.
     pub base_frame: Option<String>,
-    /// True to take poses of lidar odometry, whichever the log has.
+    /// True to take poses of lidar odometry, whichever the log has; depth cameras are left out.
     pub lidar_odometry: bool,
+    /// Streams of depth cameras.
+    pub cameras: CameraWishes,
 }
 
 /// Roles by topic of the log, the source of poses, and the frames.
@@ -37,6 +40,8 @@ pub struct TopicWishes {
 pub struct TopicPlan {
     /// Role by index of the topic in the log.
     pub roles: BTreeMap<usize, Role>,
+    /// Depth cameras whose images become clouds.
+    pub cameras: Vec<DepthCamera>,
     /// Source of poses.
     pub source: InsSource,
     /// Frame of the map.
@@ -93,16 +98,35 @@ impl TopicPlan {
 /// Assigns roles to the topics in use, and finds the frames that the user does not name.
 pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicError> {
     let mut clouds = survey::clouds(bag)?;
+    let mut cameras = match wishes.lidar_odometry {
+        true => Cameras::default(),
+        false => Cameras::find(bag, &wishes.cameras)?,
+    };
     if !wishes.points.is_empty() {
-        let wanted = wishes.points.iter().map(|name| find_cloud(bag, name));
+        let wanted = wishes.points.iter();
+        let wanted = wanted.map(|name| find_cloud(bag, name, &cameras));
         let wanted: BTreeSet<usize> = wanted.collect::<Result<_, _>>()?;
         clouds.retain(|cloud| wanted.contains(&cloud.topic));
+        cameras
+            .all
+            .retain(|found| wanted.contains(&found.camera.depth));
+    } else if clouds.is_empty() {
+        cameras.keep_one_per_sensor(bag);
+    } else {
+        cameras.leave_out(bag);
     }
+    cameras.check()?;
+    clouds.extend(cameras.all.iter().map(|found| CloudTopic {
+        topic: found.camera.depth,
+        cloud_type: None,
+        frame: found.frame.clone(),
+        labelled: found.camera.is_labelled(),
+    }));
     if clouds.is_empty() {
         return Err(TopicError::NoClouds {
             types: type_names(),
             has: listing(bag),
-            remedy: packets::remedy(bag),
+            remedy: packets::remedy(bag) + &cameras.remedy,
         });
     }
     let transforms = transforms(bag, &clouds)?;
@@ -113,7 +137,7 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
         clouds,
         tree,
         transforms: transforms.clone(),
-        choices: Vec::new(),
+        choices: cameras.lines,
     };
     let poses = log.poses()?;
     let map_frame = log.map_frame(&poses);
@@ -124,7 +148,13 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
     let mut roles = BTreeMap::new();
     let type_of = |topic: &usize| log.clouds.iter().find(|cloud| cloud.topic == *topic);
     let of_clouds = chosen.iter().filter_map(type_of);
-    roles.extend(of_clouds.map(|cloud| (cloud.topic, Role::Cloud(cloud.cloud_type))));
+    let of_clouds = of_clouds.filter_map(|cloud| Some((cloud.topic, cloud.cloud_type?)));
+    roles.extend(of_clouds.map(|(topic, cloud_type)| (topic, Role::Cloud(cloud_type))));
+    let cameras = cameras.all.into_iter().map(|found| found.camera);
+    let cameras: Vec<_> = cameras
+        .filter(|camera| chosen.contains(&camera.depth))
+        .collect();
+    roles.extend(cameras.iter().flat_map(DepthCamera::roles));
     roles.extend(
         poses
             .topics
@@ -135,6 +165,7 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
     roles.extend(transforms.map(|(topic, is_static)| (topic, Role::Transforms(is_static))));
     let mut plan = TopicPlan {
         roles,
+        cameras,
         source: poses.source,
         map_frame,
         base_frame: poses.base_frame,
@@ -189,11 +220,14 @@ fn said(bag: &BagReader, plan: &TopicPlan) -> Vec<String> {
         base_frame,
         ..
     } = plan;
-    vec![
+    let cameras = plan.cameras.iter().map(|camera| camera.line(bag));
+    let mut lines = vec![
         format!("clouds: {}", names(Role::is_cloud)),
         format!("poses: {poses}, as {source}, of {base_frame} in {map_frame}"),
         format!("transforms: {tf}"),
-    ]
+    ];
+    lines.extend(cameras);
+    lines
 }
 
 impl Log<'_> {
@@ -310,21 +344,26 @@ fn transforms(bag: &BagReader, clouds: &[CloudTopic]) -> Result<Vec<(usize, bool
 }
 
 /// Place of a topic of clouds that the user names.
-fn find_cloud(bag: &BagReader, name: &str) -> Result<usize, TopicError> {
-    let mut topics = bag.topics().iter();
-    topics
-        .position(|topic| topic.name == name && CloudType::of(&topic.type_name).is_some())
+fn find_cloud(bag: &BagReader, name: &str, cameras: &Cameras) -> Result<usize, TopicError> {
+    let is_depth = |topic| { cameras.all.iter() }.any(|found| found.camera.depth == topic);
+    let mut topics = bag.topics().iter().enumerate();
+    let found = topics.find(|(i, topic)| {
+        topic.name == name && (CloudType::of(&topic.type_name).is_some() || is_depth(*i))
+    });
+    found
+        .map(|(i, _)| i)
         .ok_or_else(|| TopicError::MissingClouds {
             name: name.to_owned(),
             types: type_names(),
             has: listing(bag),
-            remedy: packets::remedy(bag),
+            remedy: packets::remedy(bag) + &cameras.remedy,
         })
 }
 
-/// Types of clouds, for an error.
+/// Types of clouds and of what becomes clouds, for an error.
 fn type_names() -> String {
-    CloudType::ALL.map(CloudType::name).join(", ")
+    let clouds = CloudType::ALL.map(CloudType::name).join(", ");
+    format!("{clouds}, or {}", cameras::type_names())
 }
 
 /// Place of a topic of a type that the user names.

@@ -8,6 +8,7 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use super::plan::{TopicWishes, find};
 use super::survey::{self, CloudTopic, FrameTree, PoseTopic};
 use super::topics::{TopicError, listing};
+use crate::cloud_input::CloudType;
 use crate::enu_transformer::ins::InsSource;
 
 /// Mean rate below which poses alone leave gaps that are not interpolated (`max_pose_gap_s`), Hz.
@@ -248,16 +249,24 @@ impl Log<'_> {
 
     /// Poses by lidar odometry, of the machine where transforms connect it with clouds, else of a sensor.
     fn of_scans(&self) -> Result<Poses, TopicError> {
-        let best = self.clouds.iter().max_by_key(|cloud| {
+        let scans = { self.clouds.iter() }.filter(|cloud| cloud.cloud_type.is_some());
+        let best = scans.max_by_key(|cloud| {
             let is_carried = |base: &String| self.tree.connects(base, &cloud.frame);
             let is_carried = self.known_base().is_some_and(|base| is_carried(&base));
             (
                 is_carried,
-                !cloud.cloud_type.is_planar(),
+                !cloud.cloud_type.is_some_and(CloudType::is_planar),
                 self.count(cloud.topic),
                 std::cmp::Reverse(cloud.topic),
             )
         });
+        if best.is_none() && !self.clouds.is_empty() {
+            let depth: Vec<&str> = self.clouds.iter().map(|c| self.name(c.topic)).collect();
+            return Err(TopicError::NoPoses {
+                depth: depth.join(", "),
+                has: listing(self.bag),
+            });
+        }
         let (topic, frame) = best.map_or((None, ODOM), |best| (Some(best.topic), &best.frame));
         let base = self
             .known_base()

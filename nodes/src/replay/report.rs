@@ -5,7 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::ScanPosesReport;
+use super::{CameraReport, ScanPosesReport};
 use crate::enu_transformer::{Refusal, TransformerReport};
 use crate::lattice_mapper::MapperReport;
 use crate::voxel_marker_publisher::MarkerReport;
@@ -35,6 +35,9 @@ pub struct RunReport {
     pub clouds_in_log: u64,
     /// From clouds of sensors to clouds in the map.
     pub transformer: TransformerReport,
+    /// From depth images to clouds, one for each depth camera.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<CameraReport>,
     /// One for each lattice.
     pub lattices: Vec<LatticeReport>,
     /// Latitude and longitude in degrees and ellipsoidal height in m of the map's origin, where known.
@@ -66,6 +69,12 @@ impl RunReport {
         let is_empty = |report: &LatticeReport| report.map.voxels == 0;
         if !self.lattices.iter().any(is_empty) {
             return Ok(());
+        }
+        let of_cameras = self.cameras.iter().map(CameraReport::cause_of_nothing);
+        let of_cameras = of_cameras.collect::<Option<Vec<_>>>().unwrap_or_default();
+        if !of_cameras.is_empty() && self.transformer.counts.points_in == 0 {
+            let cause = of_cameras.join("; ");
+            return Err(NothingMapped { cause });
         }
         let counts = &self.transformer.counts;
         let cause = match self.transformer.cause_of_nothing() {
@@ -105,6 +114,7 @@ impl RunReport {
         let arrived = counts.clouds_in + refused;
         let odometry = self.odometry.as_ref();
         let arrived = arrived + odometry.map_or(0, ScanPosesReport::left_out);
+        let arrived = arrived + self.cameras.iter().map(CameraReport::left_out).sum::<u64>();
         let missing = self.clouds_in_log.saturating_sub(arrived);
         if missing > 0 {
             let all = self.clouds_in_log;
@@ -113,6 +123,7 @@ impl RunReport {
             ));
         }
         lines.extend(odometry.into_iter().flat_map(ScanPosesReport::losses));
+        lines.extend(self.cameras.iter().flat_map(CameraReport::losses));
         for (reason, count) in self.transformer.dropped() {
             lines.push(format!("{count} of {} clouds: {reason}", counts.clouds_in));
         }
@@ -195,6 +206,9 @@ impl fmt::Display for RunReport {
             counts.points_out_of_range,
             counts.points_no_time
         )?;
+        for camera in &self.cameras {
+            writeln!(f, "{camera}")?;
+        }
         if let Some(odometry) = &self.odometry {
             writeln!(f, "{odometry}")?;
         }
@@ -254,6 +268,7 @@ mod tests {
             source: "log".into(),
             clouds_in_log: 10,
             transformer: TransformerReport::default(),
+            cameras: Vec::new(),
             lattices: vec![LatticeReport {
                 map: MapperReport::of(&mapper),
                 markers: MarkerReport::default(),

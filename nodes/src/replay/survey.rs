@@ -25,10 +25,11 @@ const MAX_DISTANCE_M: f64 = 10_000.0;
 /// Limit of frames in the tree.
 const MAX_FRAMES: usize = 2000;
 
-/// A cloud topic, described by its first message.
+/// A topic of clouds or depth images, described by its first message.
 pub(super) struct CloudTopic {
     pub topic: usize,
-    pub cloud_type: CloudType,
+    /// `None`: depth images.
+    pub cloud_type: Option<CloudType>,
     pub frame: String,
     pub labelled: bool,
 }
@@ -156,7 +157,7 @@ pub(super) fn clouds(bag: &BagReader) -> Result<Vec<CloudTopic>, TopicError> {
             let Some(message) = message else { continue };
             clouds.push(CloudTopic {
                 topic,
-                cloud_type,
+                cloud_type: Some(cloud_type),
                 frame: bare(&message.header().frame_id),
                 labelled: message.is_labelled(),
             });
@@ -270,7 +271,10 @@ pub(super) fn topics_of<'a>(
 }
 
 /// First message of a topic, if it decodes.
-fn first<M: DeserializeOwned>(bag: &BagReader, topic: usize) -> Result<Option<M>, TopicError> {
+pub(super) fn first<M: DeserializeOwned>(
+    bag: &BagReader,
+    topic: usize,
+) -> Result<Option<M>, TopicError> {
     first_of(bag, topic, cdr::from_slice)
 }
 

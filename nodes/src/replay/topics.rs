@@ -3,7 +3,9 @@
 use lattice_bag::{BagError, BagReader};
 use thiserror::Error;
 
+use super::cameras::CameraInput;
 use crate::cloud_input::CloudType;
+use lattice_runtime::params::ParamError;
 
 /// Error of a log that cannot be replayed.
 #[derive(Debug, Error)]
@@ -56,6 +58,35 @@ pub enum TopicError {
         /// Robots with the topics of their clouds and transforms.
         robots: String,
     },
+    /// Depth images without a stream that the parameters ask for.
+    #[error(
+        "{depth}: no {what} in its frame '{frame}' are in the log, as the parameters ask: set `{parameter}`, or record \
+         depth that is registered to them"
+    )]
+    NoCompanion {
+        /// Topic of the depth images.
+        depth: String,
+        /// Frame of the depth images.
+        frame: String,
+        /// The missing stream.
+        what: &'static str,
+        /// Parameter that does without.
+        parameter: &'static str,
+    },
+    /// Depth images without poses.
+    #[error(
+        "no poses in the log for the depth images of {depth}, which lidar odometry does not register: record /tf of a \
+         fixed frame or nav_msgs/msg/Odometry too, as a visual odometry or SLAM node publishes them; the log has {has}"
+    )]
+    NoPoses {
+        /// Topics of the depth images.
+        depth: String,
+        /// Topics of the log with their types.
+        has: String,
+    },
+    /// Parameters of `semantic_cloud`.
+    #[error(transparent)]
+    Params(#[from] ParamError),
     /// Error of reading the log.
     #[error(transparent)]
     Bag(#[from] BagError),
@@ -66,6 +97,8 @@ pub enum TopicError {
 pub enum Role {
     /// Clouds of a sensor.
     Cloud(CloudType),
+    /// Input of a depth camera.
+    Camera(CameraInput),
     /// INS message of this ROS type.
     Ins(&'static str),
     /// `/tf` or, if true, `/tf_static`.
@@ -73,9 +106,15 @@ pub enum Role {
 }
 
 impl Role {
-    /// True for clouds of any type.
+    /// True for clouds of any type, and for depth images, which become clouds.
     pub fn is_cloud(self) -> bool {
-        matches!(self, Self::Cloud(_))
+        use CameraInput::{CompressedDepth, Depth};
+        matches!(self, Self::Cloud(_) | Self::Camera(Depth | CompressedDepth))
+    }
+
+    /// True for images that depth images are matched with.
+    pub fn is_companion(self) -> bool {
+        matches!(self, Self::Camera(input) if input.is_companion())
     }
 }
 

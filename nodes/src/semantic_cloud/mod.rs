@@ -20,6 +20,8 @@ pub use crate::camera::{
 };
 pub use counts::{CloudCounts, CloudReport, PointCounts};
 pub use options::{CloudOptions, LabelSource};
+#[cfg(feature = "bags")]
+pub(crate) use parameters::Settings;
 pub use parameters::declare;
 pub use project::PointOptions;
 pub use waiting::{PairOptions, Stream};

@@ -26,7 +26,7 @@ const ABOUT: &[About] = about! {
 };
 
 /// Settings from the parameters of the node.
-pub(super) struct Settings {
+pub(crate) struct Settings {
     pub cloud: CloudOptions,
     /// Built-in network with its options.
     pub network: Option<(NetworkSettings, SegmenterOptions)>,
@@ -38,7 +38,7 @@ pub(super) struct Settings {
 
 impl Settings {
     /// Reads the parameters of the node.
-    pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
+    pub(crate) fn from_params(params: &Params) -> Result<Self, ParamError> {
         params.describe(ABOUT);
         params.describe(NETWORK);
         params.describe(options::COMMON);

@@ -6,6 +6,7 @@ mod grid;
 mod info;
 mod output;
 mod query;
+mod save;
 
 use std::fs::File;
 use std::io::BufReader;
@@ -17,7 +18,7 @@ use lattice_core::voxels::label_names::{LabelNames, read_label_names};
 
 use super::{CliResult, fleet, init_logging};
 
-/// Inspect, export, merge, compare, crop and query map files
+/// Inspect, export, merge, compare, crop, query and save map files
 #[derive(Subcommand)]
 pub enum Map {
     /// Show lattice, size, extent and statistics
@@ -33,6 +34,8 @@ pub enum Map {
     Crop(combine::Crop),
     /// Find the nearest voxels, the clearance of a point, or the shortest path of a ball
     Query(query::Query),
+    /// Have a running mapper write its map
+    Save(save::Save),
     /// Add map files to a folder of Parquet tables; needs the program lattice-fleet
     ToTable(fleet::Fleet),
     /// Write one map file from a folder of Parquet tables; needs the program lattice-fleet
@@ -50,6 +53,7 @@ impl Map {
             Self::Diff(command) => command.run(),
             Self::Crop(command) => command.run(),
             Self::Query(command) => command.run(),
+            Self::Save(command) => command.run(),
             Self::ToTable(command) => command.run_as("to-table"),
             Self::FromTable(command) => command.run_as("from-table"),
         }

@@ -1,5 +1,6 @@
 //! `lattice replay`: maps from a log.
 
+mod depth;
 pub mod node_process;
 mod params;
 mod processes;
@@ -19,14 +20,16 @@ use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::enu_transformer::ins::InsSource;
 use lattice_nodes::files::atomic_write;
 use lattice_nodes::lattice_mapper::MapperOptions;
-use lattice_nodes::replay::{self, Pipeline, RunReport, Slice, TopicPlan, TopicWishes};
+use lattice_nodes::replay::{
+    self, CameraWishes, DepthClouds, Pipeline, RunReport, Slice, TopicPlan, TopicWishes,
+};
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_runtime::LoopbackDomain;
 use processes::DdsReplay;
 pub use processes::{param, quoted, yaml_text};
 
-/// Limit of lattices in a replay over DDS: each needs two of the twelve participants on loopback.
-const MAX_LOOPBACK_LATTICES: usize = 5;
+/// Participants on loopback beside the player and the transformer: a lattice needs two of them, a depth camera one.
+const MAX_LOOPBACK_NODES: usize = 10;
 
 /// Map a rosbag2 log
 #[derive(Args, Clone, Debug, Default)]
@@ -52,7 +55,7 @@ pub struct Replay {
     /// One parameter, as in `-p ins.source:=odometry`
     #[arg(short = 'p', long = "param", value_name = "NAME:=VALUE")]
     pub param: Vec<String>,
-    /// Cloud topics; by default detected in the log
+    /// Topics of clouds or depth images; by default detected in the log
     #[arg(long, value_name = "TOPIC")]
     pub points: Vec<String>,
     /// Source of poses: odometry, inspvax, inspva, navsatfix_imu, pose, pose_with_covariance, or tf (transforms
@@ -159,11 +162,13 @@ impl Replay {
             return self.replay_planned(&bag, &plan);
         }
         let lattices: Vec<_> = self.maps()?.into_iter().map(|map| map.lattice).collect();
-        if lattices.len() > MAX_LOOPBACK_LATTICES {
+        let cameras = plan.cameras.len();
+        let most = MAX_LOOPBACK_NODES.saturating_sub(cameras) / 2;
+        if lattices.len() > most {
             let count = lattices.len();
             return Err(format!(
-                "{count} lattices over DDS on loopback: at most \
-                 {MAX_LOOPBACK_LATTICES} are possible; use --direct"
+                "{count} lattices over DDS on loopback: at most {most} are possible with {cameras} depth cameras; \
+                 use --direct"
             )
             .into());
         }
@@ -200,6 +205,10 @@ impl Replay {
         }
         let markers = MarkerOptions::from_params(&self.params_of("voxel_marker_publisher")?)?;
         let mut pipeline = Pipeline::new(transformer, maps, &markers)?;
+        if !plan.cameras.is_empty() {
+            let params = self.params_of("semantic_cloud")?;
+            pipeline.set_depth_clouds(DepthClouds::new(bag, plan, &params)?);
+        }
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads)
             .build()?;
@@ -227,6 +236,9 @@ impl Replay {
         let plan = replay::plan(bag, &self.wishes()?)?;
         for line in &plan.choices {
             eprintln!("{line}");
+        }
+        if plan.cameras.is_empty() {
+            self.check_names_of_clouds()?;
         }
         Ok(plan)
     }
@@ -308,6 +320,7 @@ impl Replay {
             ins,
             map_frame: frame("map_frame")?,
             base_frame: frame("base_frame")?,
+            cameras: CameraWishes::from_params(&self.params_of("semantic_cloud")?)?,
             ..TopicWishes::default()
         })
     }

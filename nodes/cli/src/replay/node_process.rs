@@ -43,6 +43,7 @@ impl NodeProcess {
         node: &str,
         namespace: Option<&str>,
         params: &[String],
+        remaps: &[String],
         replay: &DdsReplay,
         report: &Path,
     ) -> CliResult<Self> {
@@ -68,8 +69,8 @@ impl NodeProcess {
                 command.args(["-r", &format!("{shared}:=/{shared}")]);
             }
         }
-        for remap in replay.remaps() {
-            command.args(["-r", &remap]);
+        for remap in replay.remaps().iter().chain(remaps) {
+            command.args(["-r", remap]);
         }
         // The first of several nodes writes the report.
         let first = nodes.first().copied().unwrap_or_default();

@@ -11,10 +11,20 @@ use lattice_runtime::ros_args::RosArgs;
 use super::Replay;
 use crate::CliResult;
 
+/// Node that makes clouds of depth images.
+pub(super) const CAMERA_NODE: &str = "semantic_cloud";
+
 impl Replay {
-    /// Rejects names unknown to the nodes of the replay.
+    /// Rejects names unknown to the nodes of any replay.
     pub(super) fn check_names(&self) -> CliResult {
         executables::check_names(&self.args()?, &self.nodes(), Files::Own)
+    }
+
+    /// Rejects names unknown to the nodes of a replay without depth images.
+    pub(super) fn check_names_of_clouds(&self) -> CliResult {
+        let mut nodes = self.nodes();
+        nodes.retain(|(name, _)| *name != CAMERA_NODE);
+        executables::check_names(&self.args()?, &nodes, Files::Own)
     }
 
     /// Nodes of the replay, with the declarations of their parameters.
@@ -24,6 +34,7 @@ impl Replay {
             "lattice_mapper",
             "voxel_marker_publisher",
         ];
+        names.push(CAMERA_NODE);
         names.extend(self.viewer.map(|_| "viewer_server"));
         let nodes = names.into_iter();
         let nodes = nodes.map(|name| (name, executables::reader_of(name)));
@@ -40,6 +51,12 @@ impl Replay {
             arguments.extend(["-p".to_owned(), param.clone()]);
         }
         Ok(RosArgs::parse(arguments)?)
+    }
+
+    /// True if a network labels the colour images.
+    pub(super) fn has_network(&self) -> CliResult<bool> {
+        let model = self.params_of(CAMERA_NODE)?.string("model", "")?;
+        Ok(!model.is_empty())
     }
 
     /// Parameters of a node.

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use lattice_core::lattice::{Lattice, LatticeKind};
 
+use super::depth;
 use super::node_process::{NodeProcess, warn_of_short_buffer};
 use super::{Replay, map_file};
 use crate::CliResult;
@@ -46,6 +47,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
         "enu_transformer",
         None,
         &replay.transformer_arguments(),
+        &[],
         replay,
         &scratch.path().join("enu_transformer.json"),
     )?;
@@ -56,10 +58,12 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
         "/points_enu: subscriber matched ({})",
         branches.len()
     ))?;
+    let cameras = depth::start(replay, scratch.path())?;
     let player = NodeProcess::start(
         "bag_player",
         None,
-        &replay.player_arguments(),
+        &replay.player_arguments()?,
+        &[],
         replay,
         &scratch.path().join("bag_player.json"),
     )?;
@@ -74,6 +78,8 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
     })?;
     progress.set(1.0);
     progress.say("nodes end");
+    let cameras = cameras.into_iter().map(depth::CameraProcess::end);
+    let cameras = cameras.collect::<CliResult<_>>()?;
     let transformer = transformer.end()?;
     // The branch with the page ends last, so that the page stays available.
     let (last, first): (Vec<_>, Vec<_>) =
@@ -85,6 +91,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
         source: replay.options.bag.display().to_string(),
         clouds_in_log: replay.plan.clouds(replay.reader),
         transformer,
+        cameras,
         lattices: lattices.into_values().collect(),
         origin: None,
         odometry: None,
@@ -132,13 +139,19 @@ impl DdsReplay<'_> {
         Ok(())
     }
 
-    fn topic<'a>(&'a self, wanted: impl Fn(Role) -> bool + 'a) -> Vec<&'a str> {
+    /// Topics of the log with a role.
+    pub fn topic<'a>(&'a self, wanted: impl Fn(Role) -> bool + 'a) -> Vec<&'a str> {
         let topics = self.plan.topics(self.reader, wanted);
         topics.map(|topic| topic.name.as_str()).collect()
     }
 
-    fn clouds(&self) -> Vec<&str> {
-        self.topic(Role::is_cloud)
+    /// Topics of clouds, those of depth cameras included.
+    fn clouds(&self) -> Vec<String> {
+        let of_log = self
+            .topic(|role| matches!(role, Role::Cloud(_)))
+            .into_iter();
+        let of_cameras = (0..self.plan.cameras.len()).map(depth::points);
+        of_log.map(str::to_owned).chain(of_cameras).collect()
     }
 
     /// Remap rules for transform topics with other names than the nodes use.
@@ -154,8 +167,10 @@ impl DdsReplay<'_> {
 
     fn transformer_arguments(&self) -> Vec<String> {
         let source = self.plan.source;
+        let clouds = self.clouds();
+        let clouds: Vec<&str> = clouds.iter().map(String::as_str).collect();
         let mut arguments = vec![
-            param("points_topics", &quoted(&self.clouds())),
+            param("points_topics", &quoted(&clouds)),
             param("ins.source", &source.to_string()),
             param("map_frame", &self.plan.map_frame),
             param("base_frame", &self.plan.base_frame),
@@ -170,14 +185,14 @@ impl DdsReplay<'_> {
                 arguments.push(param(name, topic));
             }
         }
-        for topic in self.clouds() {
+        for topic in clouds {
             arguments.push(param(&format!("qos.{topic}.reliability"), "reliable"));
             arguments.push(param(&format!("qos.{topic}.depth"), "64"));
         }
         arguments
     }
 
-    fn player_arguments(&self) -> Vec<String> {
+    fn player_arguments(&self) -> CliResult<Vec<String>> {
         let wanted = self.topic(|_| true);
         let waited = self.topic(|role| !matches!(role, Role::Transforms(_)));
         let mut arguments = vec![
@@ -189,10 +204,12 @@ impl DdsReplay<'_> {
             param("topics", &quoted(&wanted)),
             param("wait_for_subscribers", &quoted(&waited)),
         ];
-        for topic in self.clouds() {
+        let images = |role| matches!(role, Role::Cloud(_) | Role::Camera(_));
+        for topic in self.topic(images) {
             arguments.push(param(&format!("qos.{topic}.reliability"), "reliable"));
         }
-        arguments
+        arguments.extend(depth::player_arguments(self)?);
+        Ok(arguments)
     }
 }
 
@@ -237,7 +254,7 @@ impl Branch {
         let name = lattice.kind().name();
         let start = |node: &str, params: Vec<String>| {
             let report = scratch.join(format!("{name}_{node}.json"));
-            NodeProcess::start(node, Some(name), &params, replay, &report)
+            NodeProcess::start(node, Some(name), &params, &[], replay, &report)
         };
         let orientation = replay.options.orientation;
         let orientation = orientation.map(|o| param("lattice_orientation", &o.to_string()));

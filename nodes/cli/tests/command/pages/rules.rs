@@ -110,6 +110,11 @@ pub const RULES: &[(&str, &str, Rule)] = &[
         "lattice run params/rgbd.yaml",
         Works("lattice_mapper"),
     ),
+    (
+        "docs/front_ends.md",
+        "lattice replay LOG",
+        NotHere("needs the log of a depth camera; depth_logs"),
+    ),
     ("docs/front_ends.md", "lattice bag info LOG", Script),
     (
         "docs/front_ends.md",
