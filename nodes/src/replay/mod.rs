@@ -3,6 +3,7 @@
 //! Messages pass in the order of the log, so the map depends on nothing else.
 
 mod disorder;
+mod mount_samples;
 mod packets;
 mod plan;
 mod poses;
@@ -12,6 +13,7 @@ mod statics;
 mod survey;
 mod topics;
 
+pub use mount_samples::{SampleError, mount_samples};
 pub use plan::{TopicPlan, TopicWishes, plan};
 pub use report::{LatticeReport, RunReport};
 pub use scan_poses::{OdometryInput, ScanPosesReport, feed_odometry};

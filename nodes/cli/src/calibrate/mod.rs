@@ -1,8 +1,10 @@
-//! `lattice calibrate`: pose of one cloud in another.
+//! `lattice calibrate`: pose of one cloud in another, and mounts of sensors.
 
 mod answer;
 pub mod input;
 mod methods;
+#[cfg(feature = "bags")]
+mod mounts;
 pub mod options;
 
 use std::collections::BTreeMap;
@@ -10,7 +12,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use lattice_core::pose::Axes;
 use lattice_core::registration::{
     CalibrationMap, CalibrationOptions, CalibrationRequest, SemanticCloud, SourceCloud, Stage,
@@ -26,6 +28,35 @@ use input::{Guess, Place};
 use lattice_nodes::files::classes::read_classes;
 use methods::{MethodName, register_once};
 use options::SearchOptions;
+
+/// `lattice calibrate`, of a cloud or of what a subcommand names.
+#[derive(Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub struct CalibrateCommand {
+    #[command(flatten)]
+    cloud: Option<Calibrate>,
+    #[command(subcommand)]
+    other: Option<Other>,
+}
+
+/// Calibrations other than of a cloud in a map.
+#[derive(Subcommand)]
+enum Other {
+    #[cfg(feature = "bags")]
+    Mounts(Box<mounts::Mounts>),
+}
+
+impl CalibrateCommand {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        match (self.other, self.cloud) {
+            #[cfg(feature = "bags")]
+            (Some(Other::Mounts(mounts)), _) => mounts.run(),
+            (_, Some(cloud)) => cloud.run(),
+            (_, None) => Err("--map FILE and --cloud FILE are missing".into()),
+        }
+    }
+}
 
 /// Options of `lattice calibrate`.
 ///

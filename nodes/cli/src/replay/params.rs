@@ -13,7 +13,7 @@ use crate::CliResult;
 
 impl Replay {
     /// Rejects names unknown to the nodes of the replay.
-    pub(super) fn check_names(&self) -> CliResult {
+    pub fn check_names(&self) -> CliResult {
         executables::check_names(&self.args()?, &self.nodes(), Files::Own)
     }
 
