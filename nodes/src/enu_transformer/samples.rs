@@ -185,6 +185,7 @@ impl EnuTransformer {
         let turn = after.rotation * before.rotation.inverse();
         let way = after.translation.vector - before.translation.vector;
         Some(BasePose {
+            stamp_s: at_ns as f64 * 1e-9,
             map_from_base,
             velocity_m_per_s: way / span_s,
             rate_rad_per_s: turn.scaled_axis() / span_s,

@@ -3,10 +3,12 @@
 //! A coarse search lowers the number of occupied voxels (the measure of Ryde & Brünig 2011) on lattices from 2 m to
 //! 0.25 m. Gauss-Newton then lowers the spread of points about the planes of cells, whose offset and tilt are
 //! eliminated, so that only motion between poses is evidence. Each of the seven numbers has a standard deviation and a
-//! verdict, in [`MountNumber`].
+//! verdict, in [`MountNumber`]: the larger one of White's estimator by blocks of space and of the jackknife by segments
+//! of time, which shows errors of the poses that are correlated.
 
 mod coarse;
 mod correction;
+mod jackknife;
 mod planes;
 mod refine;
 #[cfg(test)]
@@ -32,6 +34,8 @@ const MIN_PLANES: usize = 30;
 /// Pose of the base at the time of points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BasePose {
+    /// Time, seconds from any origin.
+    pub stamp_s: f64,
     /// Pose of the base in the map, metres.
     pub map_from_base: Isometry3<f64>,
     /// Velocity of the origin of the base in the map frame, m/s.

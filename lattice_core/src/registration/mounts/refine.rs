@@ -2,12 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use super::jackknife;
 use super::planes::{Matrix7, Plane, Vector7, planes};
 use super::{MIN_PLANES, MountCorrection, MountError, MountNumber, MountOptions, MountSamples};
 use nalgebra::UnitQuaternion;
 
 /// Cell sizes, metres, and the most steps at each.
 const LEVELS: [(f64, usize); 3] = [(1.0, 8), (0.5, 10), (0.35, 12)];
+/// Steps without a segment of the log, from the estimate with it.
+const JACKKNIFE_STEPS: usize = 2;
 /// Largest step of a rotation (rad), of the lever arm (m) and of the time (s).
 const LARGEST_STEP: [f64; 3] = [0.05, 0.3, 0.02];
 /// Step below which the iteration ends.
@@ -53,7 +56,13 @@ pub(super) fn refine(
         iterate(samples, &mut correction, cell_m, steps, &is_free)?;
     }
     let (cell_m, steps) = LEVELS[LEVELS.len() - 1];
-    let all = sigmas(&planes(samples, &correction, cell_m), &is_free);
+    let mut all = sigmas(&planes(samples, &correction, cell_m), &is_free);
+    let by_time = jackknife::sigmas(samples, &correction, |part, correction| {
+        iterate(part, correction, cell_m, JACKKNIFE_STEPS, &is_free)
+    });
+    for ((sigma, by_time), prior) in all.iter_mut().zip(by_time).zip(PRIOR_SIGMAS) {
+        *sigma = sigma.max(by_time).min(prior);
+    }
     let limits = [
         options.max_sigma_rad,
         options.max_sigma_m,

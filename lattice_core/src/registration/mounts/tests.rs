@@ -110,6 +110,7 @@ fn samples(drive: Drive, wrong: &MountCorrection, late_s: f64, seed: u64) -> Mou
         );
         let turn = after.rotation * before.rotation.inverse();
         samples.poses.push(BasePose {
+            stamp_s: time_s,
             map_from_base: stamped,
             velocity_m_per_s: (after.translation.vector - before.translation.vector) / 0.01,
             rate_rad_per_s: turn.scaled_axis() / 0.01,
@@ -150,45 +151,175 @@ fn wrong(turn_deg: [f64; 3], shift_m: [f64; 3]) -> MountCorrection {
     MountCorrection::identity(sensor_m).of(&vector)
 }
 
+/// Left error of the rotation in the base frame (deg), of the lever arm (m) and of the time (s).
+fn errors(found: &MountEstimate, truth: &MountCorrection, late_s: f64) -> [f64; 7] {
+    let turn = (found.correction.rotation * truth.rotation.inverse()).scaled_axis();
+    let shift = found.correction.shift_m - truth.shift_m;
+    let [a, b, c] = [turn.x, turn.y, turn.z].map(f64::to_degrees);
+    [
+        a,
+        b,
+        c,
+        shift.x,
+        shift.y,
+        shift.z,
+        found.correction.time_s + late_s,
+    ]
+}
+
+fn observable(found: &MountEstimate) -> [bool; 7] {
+    found.numbers.map(|number| number.is_observable)
+}
+
 #[test]
-fn explore() {
-    for drive in [Drive::Rough, Drive::Flat, Drive::Straight] {
-        for (turn, shift, late) in [
-            ([0.0; 3], [0.0; 3], 0.0),
-            ([2.0, -1.0, 3.0], [0.2, -0.1, 0.1], 0.02),
-            ([8.0, -6.0, 10.0], [0.5, -0.6, 0.3], 0.0),
-            ([-12.0, 10.0, -13.0], [-0.8, 0.6, 0.8], -0.03),
-        ] {
-            let wrong = wrong(turn, shift);
-            let samples = samples(drive, &wrong, late, 7);
-            let begin = std::time::Instant::now();
-            match estimate_mount(&samples, &MountOptions::default()) {
-                Ok(e) => {
-                    println!(
-                        "{turn:?} {shift:?} {late}: {:?} -> {:?} planes {} of {} points, {:?}",
-                        e.before,
-                        e.after,
-                        e.planes,
-                        e.points,
-                        begin.elapsed()
-                    );
-                    let truth = wrong.vector();
-                    for (i, n) in e.numbers.iter().enumerate() {
-                        let scale = if i < 3 { 57.29578 } else { 1.0 };
-                        let true_value = if i == 6 { -late } else { truth[i] };
-                        println!(
-                            "   {:5} {:8.4} true {:8.4} sigma {:7.4} {} err/sigma {:.2}",
-                            MOUNT_NUMBERS[i],
-                            n.value * scale,
-                            true_value * scale,
-                            n.sigma * scale,
-                            n.is_observable,
-                            (n.value - true_value) / n.sigma
-                        );
-                    }
-                }
-                Err(e) => println!("{turn:?} {shift:?} {e}"),
-            }
+fn a_wrong_mount_is_found_from_turns_on_rough_ground() {
+    for (seed, turn, shift, late_s) in [
+        (1, [0.0; 3], [0.0; 3], 0.0),
+        (2, [2.0, -1.0, 3.0], [0.2, -0.1, 0.1], 0.02),
+        (3, [-12.0, 10.0, -13.0], [-0.8, 0.6, 0.8], -0.03),
+    ] {
+        let truth = wrong(turn, shift);
+        let samples = samples(Drive::Rough, &truth, late_s, seed);
+        let found = estimate_mount(&samples, &MountOptions::default()).unwrap();
+        assert_eq!(observable(&found), [true; 7]);
+        let errors = errors(&found, &truth, late_s);
+        for (i, (error, number)) in errors.iter().zip(found.numbers).enumerate() {
+            let (limit, sigma) = match i {
+                0..3 => (0.05, number.sigma.to_degrees()),
+                3..6 => (0.02, number.sigma),
+                _ => (0.001, number.sigma),
+            };
+            assert!(error.abs() < limit, "{i}: {errors:?}");
+            assert!(
+                error.abs() < 5.0 * sigma,
+                "{i}: {errors:?} {:?}",
+                found.numbers
+            );
         }
+        assert!(found.after.voxels as f64 <= 1.01 * found.before.voxels as f64);
+    }
+}
+
+#[test]
+fn flat_ground_does_not_show_the_height() {
+    let truth = wrong([3.0, 2.0, -4.0], [0.3, 0.2, 0.4]);
+    let samples = samples(Drive::Flat, &truth, 0.0, 4);
+    let found = estimate_mount(&samples, &MountOptions::default()).unwrap();
+    assert_eq!(
+        observable(&found),
+        [true, true, true, true, true, false, true]
+    );
+    let errors = errors(&found, &truth, 0.0);
+    assert_eq!(found.correction.shift_m.z, 0.0);
+    assert!(
+        errors.iter().take(3).all(|error| error.abs() < 0.05),
+        "{errors:?}"
+    );
+    assert!(
+        errors
+            .iter()
+            .skip(3)
+            .take(2)
+            .all(|error| error.abs() < 0.02),
+        "{errors:?}"
+    );
+}
+
+#[test]
+fn a_straight_way_shows_the_direction_of_travel_alone() {
+    let truth = wrong([1.0, 2.0, -3.0], [0.2, 0.2, 0.3]);
+    let samples = samples(Drive::Straight, &truth, 0.01, 5);
+    let found = estimate_mount(&samples, &MountOptions::default()).unwrap();
+    assert_eq!(
+        observable(&found),
+        [false, true, true, false, false, false, false]
+    );
+    assert_eq!(found.correction.shift_m, Vector3::zeros());
+    let errors = errors(&found, &truth, 0.0);
+    // A roll about the direction of travel remains.
+    assert!(
+        errors[1].abs() < 0.05 && errors[2].abs() < 0.05,
+        "{errors:?}"
+    );
+}
+
+#[test]
+fn moving_things_do_not_decide() {
+    let truth = wrong([-2.0, 3.0, 5.0], [0.1, -0.3, 0.2]);
+    let mut samples = samples(Drive::Rough, &truth, 0.0, 6);
+    // A lorry beside the machine, in every scan at the same place of the base.
+    let mut random = Random(6);
+    for i in 0..samples.points.len() / 6 {
+        let side = Vector3::new(3.0 * random.next(), 4.0, 0.8 + random.next());
+        samples.points[6 * i].1 = side;
+    }
+    let found = estimate_mount(&samples, &MountOptions::default()).unwrap();
+    let errors = errors(&found, &truth, 0.0);
+    assert!(
+        errors.iter().take(3).all(|error| error.abs() < 0.1),
+        "{errors:?}"
+    );
+    assert!(
+        errors
+            .iter()
+            .skip(3)
+            .take(3)
+            .all(|error| error.abs() < 0.03),
+        "{errors:?}"
+    );
+}
+
+#[test]
+fn what_cannot_be_estimated_is_refused() {
+    let options = MountOptions::default();
+    let truth = wrong([0.0; 3], [0.0; 3]);
+    let empty = MountSamples::default();
+    assert_eq!(
+        estimate_mount(&empty, &options),
+        Err(MountError::FewPoints { points: 0 })
+    );
+    let mut standing = samples(Drive::Rough, &truth, 0.0, 7);
+    let first = standing.poses[0];
+    standing.poses.fill(first);
+    let found = estimate_mount(&standing, &options);
+    assert!(
+        matches!(found, Err(MountError::NoMotion { .. })),
+        "{found:?}"
+    );
+    let mut hostile = samples(Drive::Flat, &truth, 0.0, 8);
+    for (i, (pose, point)) in hostile.points.iter_mut().enumerate() {
+        match i % 3 {
+            0 => *pose = u32::MAX,
+            1 => point.x = f64::NAN,
+            _ => point.y = 1e300,
+        }
+    }
+    let found = estimate_mount(&hostile, &options);
+    assert!(
+        matches!(found, Err(MountError::FewPlanes { .. })),
+        "{found:?}"
+    );
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn corrections_are_their_vectors(
+        turn in proptest::array::uniform3(-0.5..0.5_f64),
+        shift in proptest::array::uniform3(-2.0..2.0_f64),
+        sensor in proptest::array::uniform3(-3.0..3.0_f64),
+    ) {
+        let sensor_m = Vector3::from(sensor);
+        let mut vector = MountCorrection::identity(sensor_m).vector();
+        for i in 0..3 {
+            vector[i] = turn[i];
+            vector[3 + i] = shift[i];
+        }
+        let correction = MountCorrection::identity(sensor_m).of(&vector);
+        proptest::prop_assert!((correction.vector() - vector).norm() < 1e-12);
+        // The sensor moves by the shift alone.
+        let moved = correction.base_from_stated() * nalgebra::Point3::from(sensor_m);
+        proptest::prop_assert!((moved.coords - sensor_m - correction.shift_m).norm() < 1e-12);
     }
 }

@@ -16,6 +16,7 @@ mod indoor;
 mod lifecycle;
 mod map;
 mod merger;
+mod mounts;
 mod names;
 mod nodes;
 mod odd;
