@@ -247,11 +247,11 @@ fn a_straight_way_shows_the_direction_of_travel_alone() {
 fn moving_things_do_not_decide() {
     let truth = wrong([-2.0, 3.0, 5.0], [0.1, -0.3, 0.2]);
     let mut samples = samples(Drive::Rough, &truth, 0.0, 6);
-    // A lorry beside the machine, in every scan at the same place of the base.
+    // Things that follow the machine: in every scan at the same place of the base.
     let mut random = Random(6);
     for i in 0..samples.points.len() / 6 {
-        let side = Vector3::new(3.0 * random.next(), 4.0, 0.8 + random.next());
-        samples.points[6 * i].1 = side;
+        let by = Vector3::new(random.next(), random.next(), random.next());
+        samples.points[6 * i].1 = Vector3::new(3.0, 4.0, 0.8) + by;
     }
     let found = estimate_mount(&samples, &MountOptions::default()).unwrap();
     let errors = errors(&found, &truth, 0.0);
