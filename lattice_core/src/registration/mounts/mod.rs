@@ -3,8 +3,9 @@
 //! A coarse search lowers the number of occupied voxels (the measure of Ryde & Brünig 2011) on lattices from 2 m to
 //! 0.25 m. Gauss-Newton then lowers the spread of points about the planes of cells, whose offset and tilt are
 //! eliminated, so that only motion between poses is evidence. Each of the seven numbers has a standard deviation and a
-//! verdict, in [`MountNumber`]: the larger one of White's estimator by blocks of space and of the jackknife by segments
-//! of time, which shows errors of the poses that are correlated.
+//! verdict, in [`MountNumber`]. The standard deviation is the larger one of two: of points by blocks of space (White's
+//! estimator) with errors of the poses by segments of time, and of the jackknife over segments of the log. A motion
+//! that is not above these errors excites nothing.
 
 mod coarse;
 mod correction;
@@ -66,6 +67,10 @@ pub struct MountOptions {
     pub max_sigma_s: f64,
     /// True to estimate the time offset; else it is 0.
     pub with_time: bool,
+    /// Standard deviation of the positions of a segment of the log, metres.
+    pub pose_sigma_m: f64,
+    /// Standard deviation of the attitudes of a segment of the log, radians.
+    pub pose_sigma_rad: f64,
     /// True to skip the coarse search, for mounts within about 2 degrees and 0.2 m.
     pub is_near: bool,
 }
@@ -77,6 +82,8 @@ impl Default for MountOptions {
             max_sigma_m: 0.05,
             max_sigma_s: 0.005,
             with_time: true,
+            pose_sigma_m: 0.02,
+            pose_sigma_rad: 0.05_f64.to_radians(),
             is_near: false,
         }
     }

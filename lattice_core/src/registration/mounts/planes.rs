@@ -23,6 +23,33 @@ pub(super) type Vector7 = SVector<f64, 7>;
 /// Normal matrix of the numbers of a mount.
 pub(super) type Matrix7 = SMatrix<f64, 7, 7>;
 
+/// Derivatives of the gradient by position (m) and attitude (rad) errors of poses, in the map frame.
+pub(super) type ByPose = SMatrix<f64, 7, 6>;
+
+/// Longest segment of the log whose poses share an error, seconds.
+const LONGEST_SEGMENT_S: f64 = 5.0;
+/// Smallest number of segments.
+const SEGMENTS: f64 = 12.0;
+
+/// Segment of each pose.
+pub(super) struct Segments(Vec<u16>);
+
+impl Segments {
+    /// Segments of equal length of the samples.
+    pub(super) fn new(samples: &MountSamples) -> Segments {
+        let stamps = || samples.poses.iter().map(|pose| pose.stamp_s);
+        let first = stamps().fold(f64::INFINITY, f64::min);
+        let last = stamps().fold(f64::NEG_INFINITY, f64::max);
+        let length_s = ((last - first) / SEGMENTS).clamp(1e-3, LONGEST_SEGMENT_S);
+        // Numbers of segments saturate.
+        Segments(
+            stamps()
+                .map(|at| ((at - first) / length_s) as u16)
+                .collect(),
+        )
+    }
+}
+
 /// Evidence of a flat cell, for weight 1.
 pub(super) struct Plane {
     /// Block of the cell.
@@ -35,10 +62,22 @@ pub(super) struct Plane {
     pub variance_m2: f64,
     /// Effective number of points over the number of points.
     pub share: f64,
+    /// By segment, if asked for.
+    pub by_pose: Vec<(u16, ByPose)>,
 }
 
 /// Flat cells of the samples with a correction: of two lattices, one moved by half a cell.
 pub(super) fn planes(samples: &MountSamples, at: &MountCorrection, cell_m: f64) -> Vec<Plane> {
+    planes_of_segments(samples, at, cell_m, None)
+}
+
+/// Flat cells, with derivatives by the errors of the poses of segments.
+pub(super) fn planes_of_segments(
+    samples: &MountSamples,
+    at: &MountCorrection,
+    cell_m: f64,
+    segments: Option<&Segments>,
+) -> Vec<Plane> {
     let Ok(lattice) = Lattice::new(LatticeKind::Fcc, cell_m.powi(3)) else {
         return Vec::new();
     };
@@ -48,7 +87,7 @@ pub(super) fn planes(samples: &MountSamples, at: &MountCorrection, cell_m: f64) 
         let cells = placed.cells(&lattice, shift_m);
         let found: Vec<Option<Plane>> = cells
             .par_iter()
-            .map(|cell| placed.plane(cell, cell_m))
+            .map(|cell| placed.plane(cell, cell_m, segments))
             .collect();
         found.into_iter().flatten()
     };
@@ -109,7 +148,7 @@ impl<'a> Placed<'a> {
     }
 
     /// Evidence of a cell; `None` unless it is flat.
-    fn plane(&self, cell: &[u32], cell_m: f64) -> Option<Plane> {
+    fn plane(&self, cell: &[u32], cell_m: f64, segments: Option<&Segments>) -> Option<Plane> {
         if cell.len() < MIN_POINTS {
             return None;
         }
@@ -144,6 +183,33 @@ impl<'a> Placed<'a> {
         jj.ger(-1.0 / count, &j1, &j1, 1.0);
         jj.ger(-1.0 / (count * middle), &ju, &ju, 1.0);
         jj.ger(-1.0 / (count * most), &jv, &jv, 1.0);
+        let mut by_pose: Vec<(u16, ByPose)> = Vec::new();
+        if let Some(segments) = segments {
+            let mean = j1 / count;
+            let (tilt_u, tilt_v) = (ju / (count * middle), jv / (count * most));
+            for number in cell {
+                let off = self.point(*number) - mean_m;
+                let row = self.row(*number, &normal)?;
+                let row = row - mean - tilt_u * across.dot(&off) - tilt_v * along.dot(&off);
+                let (place, _) = self.samples.points.get(*number as usize)?;
+                let pose = self.poses.get(*place as usize)?;
+                let from_base = self.point(*number) - pose.translation.vector;
+                let turn = from_base.cross(&normal);
+                let n = normal;
+                let of_pose = SVector::from([n.x, n.y, n.z, turn.x, turn.y, turn.z]);
+                let segment = segments.0.get(*place as usize).copied()?;
+                let sum = match by_pose.iter().position(|(one, _)| *one == segment) {
+                    Some(known) => known,
+                    None => {
+                        by_pose.push((segment, ByPose::zeros()));
+                        by_pose.len() - 1
+                    }
+                };
+                if let Some((_, sum)) = by_pose.get_mut(sum) {
+                    sum.ger(1.0, &row, &of_pose, 1.0);
+                }
+            }
+        }
         let block_m = BLOCK_CELLS * cell_m;
         Some(Plane {
             block: [0, 1, 2].map(|i| (mean_m[i] / block_m).floor() as i32),
@@ -151,6 +217,7 @@ impl<'a> Placed<'a> {
             gradient: jr,
             variance_m2: least,
             share: (FULL_POINTS / count).min(1.0),
+            by_pose,
         })
     }
 

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::jackknife;
-use super::planes::{Matrix7, Plane, Vector7, planes};
+use super::planes::{ByPose, Matrix7, Plane, Segments, Vector7, planes, planes_of_segments};
 use super::{MIN_PLANES, MountCorrection, MountError, MountNumber, MountOptions, MountSamples};
-use nalgebra::UnitQuaternion;
+use nalgebra::{Matrix6, UnitQuaternion};
 
 /// Cell sizes, metres, and the most steps at each.
 const LEVELS: [(f64, usize); 3] = [(1.0, 8), (0.5, 10), (0.35, 12)];
@@ -56,7 +56,7 @@ pub(super) fn refine(
         iterate(samples, &mut correction, cell_m, steps, &is_free)?;
     }
     let (cell_m, steps) = LEVELS[LEVELS.len() - 1];
-    let mut all = sigmas(&planes(samples, &correction, cell_m), &is_free);
+    let mut all = sigmas(samples, &correction, cell_m, &is_free, options);
     let by_time = jackknife::sigmas(samples, &correction, |part, correction| {
         iterate(part, correction, cell_m, JACKKNIFE_STEPS, &is_free)
     });
@@ -109,12 +109,15 @@ struct Sums {
     gradient: Vector7,
     /// Sums of the gradients' outer products by block.
     spread: Matrix7,
+    /// Derivatives of the gradient by the errors of the poses of a segment.
+    segments: BTreeMap<u16, ByPose>,
 }
 
 fn sums(planes: &[Plane], is_free: &[bool; 7]) -> Sums {
     let noise_m2 = LEAST_NOISE_M.powi(2) + median_m(planes).powi(2);
     let (mut normal, mut gradient) = (Matrix7::zeros(), Vector7::zeros());
     let mut blocks: BTreeMap<[i32; 3], Vector7> = BTreeMap::new();
+    let mut segments: BTreeMap<u16, ByPose> = BTreeMap::new();
     for plane in planes {
         // Cells with a large spread hold moving things or more than one surface.
         let robust = 1.0 / (1.0 + plane.variance_m2 / noise_m2);
@@ -129,6 +132,13 @@ fn sums(planes: &[Plane], is_free: &[bool; 7]) -> Sums {
         normal += jj;
         gradient += jr;
         *blocks.entry(plane.block).or_insert_with(Vector7::zeros) += jr;
+        for (segment, by_pose) in &plane.by_pose {
+            let mut by_pose = by_pose * weight;
+            for i in (0..7).filter(|i| !is_free[*i]) {
+                by_pose.row_mut(i).fill(0.0);
+            }
+            *segments.entry(*segment).or_insert_with(ByPose::zeros) += by_pose;
+        }
     }
     let count = blocks.len().max(9) as f64;
     let spread: Matrix7 = blocks.values().map(|g| g * g.transpose()).sum();
@@ -136,6 +146,7 @@ fn sums(planes: &[Plane], is_free: &[bool; 7]) -> Sums {
         normal,
         gradient,
         spread: spread * (count / (count - 8.0)),
+        segments,
     }
 }
 
@@ -144,14 +155,28 @@ fn prior() -> Matrix7 {
     Matrix7::from_diagonal(&Vector7::from_fn(|i, _| PRIOR[kind(i)].powi(-2)))
 }
 
-/// Standard deviations that allow for correlated errors within blocks (White's estimator).
-fn sigmas(planes: &[Plane], is_free: &[bool; 7]) -> [f64; 7] {
-    let sums = sums(planes, is_free);
-    let all = sums.normal + prior();
-    let Some(inverse) = all.try_inverse() else {
+/// Standard deviations that allow for correlated errors of points within blocks (White's estimator), and of the poses
+/// within segments of time.
+fn sigmas(
+    samples: &MountSamples,
+    at: &MountCorrection,
+    cell_m: f64,
+    is_free: &[bool; 7],
+    options: &MountOptions,
+) -> [f64; 7] {
+    let segments = Segments::new(samples);
+    let found = planes_of_segments(samples, at, cell_m, Some(&segments));
+    let sums = sums(&found, is_free);
+    let Some(inverse) = (sums.normal + prior()).try_inverse() else {
         return PRIOR_SIGMAS;
     };
-    let covariance = inverse * (sums.spread + prior()) * inverse;
+    let (position, attitude) = (options.pose_sigma_m.powi(2), options.pose_sigma_rad.powi(2));
+    let variance = [position, position, position, attitude, attitude, attitude];
+    let variance = Matrix6::from_diagonal(&variance.into());
+    let of_poses: Matrix7 = (sums.segments.values())
+        .map(|by_pose| by_pose * variance * by_pose.transpose())
+        .sum();
+    let covariance = inverse * (sums.spread + of_poses + prior()) * inverse;
     std::array::from_fn(|i| covariance[(i, i)].max(0.0).sqrt().min(PRIOR_SIGMAS[i]))
 }
 
