@@ -175,8 +175,8 @@ impl Mounts {
             }
             MountError::FewPlanes { .. } => "use a part of the log beside walls (--start, --stop)",
             MountError::NoFit { .. } => {
-                "set a mount near the true one on tf or by parameters, in degrees of `ros2 run tf2_ros static_transform_publisher`; \
-                 search from nothing, of mirrored or permuted axes too, is not supported. If it is near, check the poses (`lattice replay`)"
+                "state the mount on tf or by parameters to within this range, or check the poses by `lattice replay`; \
+                 a search from nothing, of permuted and mirrored axes too, is not supported"
             }
         };
         format!("{error}: {remedy}")
