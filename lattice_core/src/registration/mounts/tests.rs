@@ -116,7 +116,10 @@ fn samples(drive: Drive, wrong: &MountCorrection, late_s: f64, seed: u64) -> Mou
             rate_rad_per_s: turn.scaled_axis() / 0.01,
         });
         for _ in 0..400 {
-            let (azimuth, elevation) = (random.next() * 3.1416, 0.35 * random.next() - 0.1);
+            let (azimuth, elevation) = (
+                random.next() * std::f64::consts::PI,
+                0.35 * random.next() - 0.1,
+            );
             let along = Vector3::new(
                 azimuth.cos() * elevation.cos(),
                 azimuth.sin() * elevation.cos(),

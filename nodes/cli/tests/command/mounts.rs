@@ -35,6 +35,8 @@ fn a_wrong_boresight_of_the_loader_is_found_checked_and_gone_with_the_parameters
     let folder = tempfile::tempdir().unwrap();
     let log = simulate(&["bobcat", "--duration", "30"], &folder.path().join("log"));
     let sensors = [
+        "--ins",
+        "inspvax",
         "--points",
         "/left/points",
         "--points",
