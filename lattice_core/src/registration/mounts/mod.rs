@@ -27,6 +27,9 @@ pub const MOUNT_NUMBERS: [&str; 7] = ["roll", "pitch", "yaw", "x", "y", "z", "ti
 
 /// Cell size at which occupied voxels before and after are counted, metres.
 const COUNT_CELL_M: f64 = 0.25;
+/// Rotation (rad) and shift (m) above which a correction lowers the number of occupied voxels.
+const LARGE_RAD: f64 = 0.02;
+const LARGE_M: f64 = 0.15;
 /// Minimum number of points.
 const MIN_POINTS: usize = 2000;
 /// Minimum number of planar cells.
@@ -225,7 +228,10 @@ pub fn estimate_mount(
             .skip(3)
             .take(3)
             .any(|n| is_outside(n, coarse::RANGE_M));
-    if outside || after.voxels as f64 > 1.02 * before.voxels as f64 {
+    // A correction of this size lowers the number of voxels by percents where it is right.
+    let is_large = correction.rotation.angle() > LARGE_RAD || correction.shift_m.norm() > LARGE_M;
+    let limit = if is_large { 0.995 } else { 1.02 };
+    if outside || after.voxels as f64 > limit * before.voxels as f64 {
         return Err(MountError::NoFit {
             range_deg: coarse::RANGE_RAD.to_degrees(),
             range_m: coarse::RANGE_M,
