@@ -174,6 +174,15 @@ fn observable(found: &MountEstimate) -> [bool; 7] {
     found.numbers.map(|number| number.is_observable)
 }
 
+/// Options for poses without errors: those of the default hide the height on ground this rough.
+fn exact_poses() -> MountOptions {
+    MountOptions {
+        pose_sigma_m: 0.002,
+        pose_sigma_rad: 1e-4,
+        ..MountOptions::default()
+    }
+}
+
 #[test]
 fn a_wrong_mount_is_found_from_turns_on_rough_ground() {
     for (seed, turn, shift, late_s) in [
@@ -183,7 +192,7 @@ fn a_wrong_mount_is_found_from_turns_on_rough_ground() {
     ] {
         let truth = wrong(turn, shift);
         let samples = samples(Drive::Rough, &truth, late_s, seed);
-        let found = estimate_mount(&samples, &MountOptions::default()).unwrap();
+        let found = estimate_mount(&samples, &exact_poses()).unwrap();
         assert_eq!(observable(&found), [true; 7]);
         let errors = errors(&found, &truth, late_s);
         for (i, (error, number)) in errors.iter().zip(found.numbers).enumerate() {
@@ -256,7 +265,7 @@ fn moving_things_do_not_decide() {
         let by = Vector3::new(random.next(), random.next(), random.next());
         samples.points[6 * i].1 = Vector3::new(3.0, 4.0, 0.8) + by;
     }
-    let found = estimate_mount(&samples, &MountOptions::default()).unwrap();
+    let found = estimate_mount(&samples, &exact_poses()).unwrap();
     let errors = errors(&found, &truth, 0.0);
     assert!(
         errors.iter().take(3).all(|error| error.abs() < 0.1),
