@@ -74,8 +74,6 @@ pub struct MountOptions {
     pub pose_sigma_m: f64,
     /// Standard deviation of the attitudes of a segment of the log, radians.
     pub pose_sigma_rad: f64,
-    /// True to skip the coarse search, for mounts within about 2 degrees and 0.2 m.
-    pub is_near: bool,
 }
 
 impl Default for MountOptions {
@@ -87,7 +85,6 @@ impl Default for MountOptions {
             with_time: true,
             pose_sigma_m: 0.02,
             pose_sigma_rad: 0.05_f64.to_radians(),
-            is_near: false,
         }
     }
 }
@@ -199,10 +196,7 @@ pub fn estimate_mount(
     }
     check_motion(&samples.poses)?;
     let stated = MountCorrection::identity(samples.sensor_m);
-    let start = match options.is_near {
-        true => stated.clone(),
-        false => coarse::search(samples, &stated),
-    };
+    let start = coarse::search(samples, &stated);
     let Refined {
         correction,
         numbers,

@@ -53,6 +53,19 @@ impl CalibrateCommand {
     }
 }
 
+#[cfg(feature = "bags")]
+fn with_subcommands(command: Command) -> Command {
+    command
+        .args_conflicts_with_subcommands(true)
+        .subcommand_negates_reqs(true)
+        .subcommand(mounts::Mounts::augment_args(Command::new(MOUNTS)))
+}
+
+#[cfg(not(feature = "bags"))]
+fn with_subcommands(command: Command) -> Command {
+    command
+}
+
 // By hand: the derived form has no required options beside a subcommand.
 impl FromArgMatches for CalibrateCommand {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
@@ -72,13 +85,7 @@ impl FromArgMatches for CalibrateCommand {
 
 impl Args for CalibrateCommand {
     fn augment_args(command: Command) -> Command {
-        let command = Calibrate::augment_args(command);
-        #[cfg(feature = "bags")]
-        let command = command
-            .args_conflicts_with_subcommands(true)
-            .subcommand_negates_reqs(true)
-            .subcommand(mounts::Mounts::augment_args(Command::new(MOUNTS)));
-        command
+        with_subcommands(Calibrate::augment_args(command))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
