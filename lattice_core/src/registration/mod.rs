@@ -8,6 +8,7 @@ mod error;
 mod global;
 mod labels;
 mod likelihood;
+pub mod mounts;
 mod named;
 mod prepared;
 mod register_options;

@@ -73,8 +73,8 @@ enum Command {
     Bag(bag::Bag),
     /// Quantize a point file (ply, pcd, las, laz, e57, bt, xyz, KITTI bin) and compare lattices
     Quantize(quantize::Quantize),
-    /// Find the pose of a cloud in a map, without a guess, with a verdict
-    Calibrate(Box<calibrate::Calibrate>),
+    /// Find the pose of a cloud in a map, without a guess, with a verdict; or the mount of a sensor from a log
+    Calibrate(calibrate::CalibrateCommand),
     /// Inspect and export map files
     #[command(subcommand)]
     Map(map::Map),

@@ -15,9 +15,12 @@ mod link_orders;
 pub mod node;
 mod options;
 mod parameters;
+mod placing;
 mod pose_frames;
 mod pose_intake;
 mod refusals;
+#[cfg(feature = "bags")]
+mod samples;
 mod speed_gate;
 mod stamp_order;
 mod transforms;
@@ -33,20 +36,19 @@ pub use options::TransformerOptions;
 pub(crate) use options::time_options;
 pub use parameters::declare;
 pub use refusals::{Refusal, Refusals, most_frequent};
+#[cfg(feature = "bags")]
+pub use samples::{LogSamples, StatedMount};
 pub(crate) use stamp_order::StampOrder;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use lattice_core::cloud::{CloudLimits, RangeLimits, RecordFormat, transform_records};
 use lattice_core::pose::{
     PoseBuffer, PoseBufferOptions, PoseMiss, StampedPose, TransformBuffer, TransformBufferOptions,
 };
-use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::geographic_msgs::GeoPointStamped;
 use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::sensor_msgs::PointCloud2;
-use nalgebra::Isometry3;
 
 use self::attitude::Attitudes;
 use self::cloud_clocks::CloudClocks;
@@ -58,7 +60,6 @@ use self::speed_gate::SpeedGate;
 use self::verdict::Verdict;
 use self::waiting::{Waiting, WaitingCloud};
 use crate::cloud_input::CloudInputError;
-use crate::convert::cloud;
 
 /// Backward step of the receiving clock above which a log is taken to repeat, ns.
 const CLOCK_JUMP_NS: i64 = 1_000_000_000;
@@ -111,6 +112,9 @@ pub struct EnuTransformer {
     last_now_ns: Option<i64>,
     counts: TransformerCounts,
     refusals: Refusals,
+    /// Samples for the calibration of mounts, in place of clouds.
+    #[cfg(feature = "bags")]
+    samples: Option<samples::Samples>,
 }
 
 impl EnuTransformer {
@@ -156,6 +160,8 @@ impl EnuTransformer {
             last_now_ns: None,
             counts: TransformerCounts::default(),
             refusals: Refusals::default(),
+            #[cfg(feature = "bags")]
+            samples: None,
             options,
         }
     }
@@ -328,72 +334,5 @@ impl EnuTransformer {
                 }
             }
         }
-    }
-
-    /// Transforms a cloud that poses and mounts cover.
-    fn place(&mut self, cloud: &WaitingCloud, out: &mut Vec<EnuOutput>) {
-        match self.transform(cloud) {
-            Ok(points) => {
-                self.counts.clouds_out += 1;
-                out.push(EnuOutput::Points(Arc::new(points)));
-            }
-            Err(reason) => self.drop_cloud(&cloud.topic, &reason),
-        }
-    }
-
-    fn transform(&mut self, waiting: &WaitingCloud) -> Result<PointCloud2, Drop> {
-        let message = &waiting.message;
-        let layout = cloud::layout_of(message);
-        let limits = CloudLimits {
-            max_points: self.options.max_cloud_points,
-        };
-        let view = layout
-            .view(&message.data, &limits)
-            .map_err(Drop::Malformed)?;
-        let map_from_sensor = |stamp_ns: i64| -> Result<Isometry3<f64>, Drop> {
-            if waiting.frame == self.options.map_frame {
-                return Ok(Isometry3::identity());
-            }
-            let map_from_base = self.map_from_base(stamp_ns).map_err(Drop::PoseGap)?;
-            let mount = self.mount(&waiting.frame, stamp_ns);
-            Ok(map_from_base * mount.map_err(|miss| Drop::no_mount(&waiting.frame, miss))?)
-        };
-        let range = RangeLimits {
-            min_range_m: self.options.min_range_m,
-            max_range_m: self.options.max_range_m,
-        };
-        let format = RecordFormat::new(
-            &view,
-            &self.options.pass_fields,
-            self.options.precision,
-            self.options.viewpoints,
-        );
-        let times = waiting.times.as_deref();
-        let moved = transform_records(
-            &view,
-            waiting.stamp_ns,
-            times,
-            &range,
-            &format,
-            map_from_sensor,
-        )?;
-        let mut header = message.header.clone();
-        header.stamp = Time::from_ns(waiting.stamp_ns);
-        header.frame_id.clone_from(&self.options.map_frame);
-        let (fields, point_step) = format.fields(moved.precision);
-        let fields = cloud::message_fields(fields);
-        self.counts.points_in += view.len() as u64;
-        self.counts.points_out += moved.points as u64;
-        self.counts.points_not_finite += moved.not_finite as u64;
-        self.counts.points_out_of_range += moved.out_of_range as u64;
-        self.counts.points_no_time += moved.no_time as u64;
-        let point_step = u32::try_from(point_step).unwrap_or(u32::MAX);
-        Ok(cloud::dense_cloud(
-            header,
-            fields,
-            point_step,
-            moved.points,
-            moved.data,
-        ))
     }
 }

@@ -53,6 +53,10 @@ impl EnuTransformer {
         now_ns: i64,
         out: &mut Vec<EnuOutput>,
     ) {
+        #[cfg(feature = "bags")]
+        if let Some(samples) = &mut self.samples {
+            samples.note_bodies(&pose.position_of, &pose.attitude_of);
+        }
         for frame in [&pose.position_of, &pose.attitude_of] {
             if let Body::Ins(frame) = frame
                 && !frame.is_empty()
@@ -171,6 +175,21 @@ impl EnuTransformer {
                 None => reference_from_base,
             },
         })
+    }
+
+    /// Lever arm and boresight of the INS at a stamp; `None` where poses are those of the base.
+    #[cfg(feature = "bags")]
+    pub(super) fn ins_mount(
+        &self,
+        (position_of, attitude_of): &(Body, Body),
+        stamp_ns: i64,
+    ) -> Option<Isometry3<f64>> {
+        if (position_of, attitude_of) == (&Body::Base, &Body::Base) {
+            return None;
+        }
+        let lever_arm_m = self.lever_arm_m(position_of, stamp_ns).ok()?;
+        let rotation = self.base_from_ins(attitude_of, stamp_ns).ok()?;
+        Some(Isometry3::from_parts(lever_arm_m.into(), rotation))
     }
 
     /// Lever arm of a body at a stamp: from the parameter, else from tf.

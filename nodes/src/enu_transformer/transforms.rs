@@ -87,6 +87,10 @@ impl EnuTransformer {
         parent_from_child: Isometry3<f64>,
         is_static: bool,
     ) -> Result<(), String> {
+        #[cfg(feature = "bags")]
+        if let Some(samples) = &mut self.samples {
+            samples.note_parent(child, parent);
+        }
         let inserted = self
             .mounts
             .insert(parent, child, stamp_ns, parent_from_child, is_static);

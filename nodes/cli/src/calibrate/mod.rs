@@ -1,8 +1,10 @@
-//! `lattice calibrate`: pose of one cloud in another.
+//! `lattice calibrate`: pose of one cloud in another, and mounts of sensors.
 
 mod answer;
 pub mod input;
 mod methods;
+#[cfg(feature = "bags")]
+mod mounts;
 pub mod options;
 
 use std::collections::BTreeMap;
@@ -10,7 +12,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use clap::Args;
+use clap::{ArgMatches, Args, Command, FromArgMatches};
 use lattice_core::pose::Axes;
 use lattice_core::registration::{
     CalibrationMap, CalibrationOptions, CalibrationRequest, SemanticCloud, SourceCloud, Stage,
@@ -26,6 +28,70 @@ use input::{Guess, Place};
 use lattice_nodes::files::classes::read_classes;
 use methods::{MethodName, register_once};
 use options::SearchOptions;
+
+/// `lattice calibrate`, of a cloud or of what a subcommand names.
+pub enum CalibrateCommand {
+    /// Pose of a cloud in a map.
+    Cloud(Box<Calibrate>),
+    /// Mount of a sensor.
+    #[cfg(feature = "bags")]
+    Mounts(Box<mounts::Mounts>),
+}
+
+/// Name of the subcommand.
+#[cfg(feature = "bags")]
+const MOUNTS: &str = "mounts";
+
+impl CalibrateCommand {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        match self {
+            Self::Cloud(command) => command.run(),
+            #[cfg(feature = "bags")]
+            Self::Mounts(command) => command.run(),
+        }
+    }
+}
+
+#[cfg(feature = "bags")]
+fn with_subcommands(command: Command) -> Command {
+    command
+        .args_conflicts_with_subcommands(true)
+        .subcommand_negates_reqs(true)
+        .subcommand(mounts::Mounts::augment_args(Command::new(MOUNTS)))
+}
+
+#[cfg(not(feature = "bags"))]
+fn with_subcommands(command: Command) -> Command {
+    command
+}
+
+// By hand: the derived form has no required options beside a subcommand.
+impl FromArgMatches for CalibrateCommand {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        #[cfg(feature = "bags")]
+        if let Some((MOUNTS, matches)) = matches.subcommand() {
+            let mounts = mounts::Mounts::from_arg_matches(matches)?;
+            return Ok(Self::Mounts(Box::new(mounts)));
+        }
+        Calibrate::from_arg_matches(matches).map(|cloud| Self::Cloud(Box::new(cloud)))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Args for CalibrateCommand {
+    fn augment_args(command: Command) -> Command {
+        with_subcommands(Calibrate::augment_args(command))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
 
 /// Options of `lattice calibrate`.
 ///

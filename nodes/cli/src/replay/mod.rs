@@ -189,7 +189,8 @@ impl Replay {
         self.replay_planned(&bag, &plan)
     }
 
-    fn replay_planned(&self, bag: &BagReader, plan: &TopicPlan) -> CliResult<RunReport> {
+    /// Options of the transformer with the topics and frames of a plan.
+    pub fn transformer(&self, plan: &TopicPlan) -> CliResult<TransformerOptions> {
         let mut transformer = TransformerOptions::from_params(&self.params_of("enu_transformer")?)?;
         transformer.ins.source = plan.source;
         transformer.map_frame.clone_from(&plan.map_frame);
@@ -199,6 +200,11 @@ impl Replay {
         if let Some(name) = transformer.ins.ignored() {
             return Err(format!("parameter {name}: the source {} ignores it", plan.source).into());
         }
+        Ok(transformer)
+    }
+
+    fn replay_planned(&self, bag: &BagReader, plan: &TopicPlan) -> CliResult<RunReport> {
+        let transformer = self.transformer(plan)?;
         let mut maps = self.maps()?;
         for map in &mut maps {
             map.map_frame.clone_from(&plan.map_frame);
@@ -232,7 +238,7 @@ impl Replay {
     }
 
     /// Chooses topics and frames, and logs them.
-    fn plan(&self, bag: &BagReader) -> CliResult<TopicPlan> {
+    pub fn plan(&self, bag: &BagReader) -> CliResult<TopicPlan> {
         let plan = replay::plan(bag, &self.wishes()?)?;
         for line in &plan.choices {
             eprintln!("{line}");

@@ -16,7 +16,7 @@ pub(super) const CAMERA_NODE: &str = "semantic_cloud";
 
 impl Replay {
     /// Rejects names unknown to the nodes of any replay.
-    pub(super) fn check_names(&self) -> CliResult {
+    pub fn check_names(&self) -> CliResult {
         executables::check_names(&self.args()?, &self.nodes(), Files::Own)
     }
 

@@ -18,6 +18,7 @@ mod lifecycle;
 mod map;
 mod map_save;
 mod merger;
+mod mounts;
 mod names;
 mod nodes;
 mod odd;

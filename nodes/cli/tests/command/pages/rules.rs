@@ -202,6 +202,11 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     ("docs/poses.md", "lattice bag info LOG", Runs("")),
     ("docs/poses.md", "lattice replay LOG --direct", Runs("")),
     (
+        "docs/poses.md",
+        "lattice calibrate mounts",
+        NotHere("mounts.rs"),
+    ),
+    (
         "docs/recording.md",
         "lattice record -a",
         Serves("", "recording /tf"),

@@ -1,0 +1,39 @@
+//! Samples of a log for the calibration of mounts.
+
+use lattice_bag::BagReader;
+
+use super::{Pipeline, Slice, TopicError, TopicPlan};
+use crate::enu_transformer::{LogSamples, TransformerOptions};
+use crate::replay::RunReport;
+use crate::voxel_marker_publisher::MarkerOptions;
+use lattice_core::raycast::FreeSpaceError;
+use thiserror::Error;
+
+/// Cause for which a log has no samples.
+#[derive(Debug, Error)]
+pub enum SampleError {
+    /// Error of the log.
+    #[error(transparent)]
+    Log(#[from] TopicError),
+    /// Error of the machines.
+    #[error(transparent)]
+    Pipeline(#[from] FreeSpaceError),
+}
+
+/// Reads the points of the clouds of a slice of a log, `limit` at most, each with the pose of the base at its time.
+///
+/// # Errors
+/// If the log cannot be read. Clouds without poses or mounts are counted in the report.
+pub fn mount_samples(
+    bag: &BagReader,
+    plan: &TopicPlan,
+    slice: &Slice,
+    transformer: TransformerOptions,
+    limit: usize,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(LogSamples, RunReport), SampleError> {
+    let mut pipeline = Pipeline::new(transformer, [], &MarkerOptions::default())?;
+    pipeline.transformer.keep_samples(limit);
+    let report = super::run(bag, plan, slice, &mut pipeline, "", progress)?;
+    Ok((pipeline.transformer.take_samples(), report))
+}
