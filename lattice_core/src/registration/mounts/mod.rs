@@ -222,10 +222,11 @@ pub fn estimate_mount(
             .skip(3)
             .take(3)
             .any(|n| is_outside(n, coarse::RANGE_M));
-    // A correction of this size lowers the number of voxels by percents where it is right.
+    // A correction of this size lowers the number of voxels by percents where it is right, and surfaces become thinner.
     let is_large = correction.rotation.angle() > LARGE_RAD || correction.shift_m.norm() > LARGE_M;
     let limit = if is_large { 0.995 } else { 1.02 };
-    if outside || after.voxels as f64 > limit * before.voxels as f64 {
+    let is_thicker = is_large && after.thickness_m > before.thickness_m;
+    if outside || is_thicker || after.voxels as f64 > limit * before.voxels as f64 {
         return Err(MountError::NoFit {
             range_deg: coarse::RANGE_RAD.to_degrees(),
             range_m: coarse::RANGE_M,
