@@ -222,10 +222,13 @@ pub fn estimate_mount(
             .skip(3)
             .take(3)
             .any(|n| is_outside(n, coarse::RANGE_M));
-    // A correction of this size lowers the number of voxels by percents where it is right, and surfaces become thinner.
+    // A correction of this size lowers the number of voxels by percents where it is right.
     let is_large = correction.rotation.angle() > LARGE_RAD || correction.shift_m.norm() > LARGE_M;
     let limit = if is_large { 0.995 } else { 1.02 };
-    let is_thicker = is_large && after.thickness_m > before.thickness_m;
+    // One that is certain makes surfaces thinner where it is right.
+    let is_certain =
+        |number: &MountNumber| number.is_observable && number.value.abs() > 3.0 * number.sigma;
+    let is_thicker = after.thickness_m > before.thickness_m && numbers.iter().any(is_certain);
     if outside || is_thicker || after.voxels as f64 > limit * before.voxels as f64 {
         return Err(MountError::NoFit {
             range_deg: coarse::RANGE_RAD.to_degrees(),
