@@ -126,7 +126,7 @@ fn a_publisher_that_has_to_end_draws_nothing_and_names_the_rest() {
     assert_eq!(bench.markers.unplaced(), waiting);
 }
 
-/// What changed while nothing was drawn is drawn with the rest of the map.
+/// Changes that came while nothing was drawn are drawn with the rest of the map.
 #[test]
 fn a_publisher_that_rested_draws_the_whole_map() {
     let options = MarkerOptions::default();

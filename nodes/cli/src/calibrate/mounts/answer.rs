@@ -206,7 +206,7 @@ impl Answer {
         }
     }
 
-    /// What to drive, for the numbers that are not observable.
+    /// Drives to be made, for the numbers that are not observable.
     pub fn remedies(&self) -> String {
         let mut texts: Vec<String> = Vec::new();
         for number in &self.numbers {

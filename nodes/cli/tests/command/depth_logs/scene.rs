@@ -45,7 +45,7 @@ const BORDER_M: f64 = 1e-5;
 /// Points by label of each cell.
 pub type Cells = BTreeMap<[i64; 3], BTreeMap<u16, u32>>;
 
-/// What a log has.
+/// Contents of a log.
 #[derive(Clone, Copy, Default)]
 pub struct Log {
     pub is_compressed: bool,
