@@ -8,6 +8,7 @@ mod counts;
 mod datum;
 mod free_options;
 mod free_space;
+mod keyframe;
 mod map_folder;
 pub mod node;
 mod occupancy;
@@ -38,7 +39,7 @@ use lattice_core::query::Shells;
 use lattice_core::raycast::FreeSpaceError;
 use lattice_core::voxels::{Changes, Distortion, VoxelList, VoxelStore};
 use lattice_msgs::geographic_msgs::{GeoPoint, GeoPointStamped};
-use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
+use lattice_msgs::lattice::LatticeMapUpdate;
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 use nalgebra::Vector3;
 use std::sync::{Arc, OnceLock};
@@ -305,30 +306,6 @@ impl LatticeMapper {
         self.history = map::sign(&mut messages, self.history, self.sequence, voxels);
         self.counts.updates += 1;
         messages
-    }
-
-    /// The whole map in self-contained chunks.
-    ///
-    /// It may contain changes that the next update repeats: updates carry states, not
-    /// differences, so applying both is harmless.
-    pub fn keyframe(&mut self) -> Vec<LatticeMap> {
-        self.counts.keyframes += 1;
-        let stamp = self.stamp();
-        match &self.occupancy {
-            Some(cells) => {
-                let keys = cells.sorted_keys();
-                map::keyframe_of_cells(cells.lattice(), cells.datum_m(), &keys, &stamp)
-            }
-            None => map::keyframe(&self.list, &stamp),
-        }
-    }
-
-    /// Free cells in self-contained chunks like those of a map; `None` if none are kept.
-    pub fn free(&self) -> Option<Vec<LatticeMap>> {
-        let (lattice, keys) = self.free_space.as_ref()?.free_cells()?;
-        let datum_m = self.list.datum_m();
-        let stamp = self.stamp();
-        Some(map::keyframe_of_cells(lattice, datum_m, &keys, &stamp))
     }
 
     /// Cell centres in the map frame, with the number of points (1 if not kept) as `intensity` and,

@@ -7,6 +7,7 @@ mod counts;
 mod diagnosis;
 mod headset_scans;
 mod intake;
+mod map;
 pub mod node;
 mod options;
 mod outputs;
@@ -30,7 +31,6 @@ use lattice_msgs::calibration::{
     CalibrateFeedback, CalibrateGoal, CalibrateResult, CalibrationResult,
 };
 use lattice_msgs::geometry_msgs::TransformStamped;
-use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::String as StringMessage;
 use lattice_msgs::vision_msgs::LabelInfo;
 use nalgebra::Isometry3;
@@ -39,8 +39,7 @@ use self::headset_scans::HeadsetScans;
 use self::state::{CurrentCalibration, PendingRequest, Running};
 use crate::convert::calibration::{result_from, set_pose};
 use crate::convert::geometry;
-use crate::hurry::Hurry;
-use crate::map_follower::{FollowError, Followed, MapFollower};
+use crate::map_follower::MapFollower;
 
 /// Request number assigned by the node.
 pub type CallId = u64;
@@ -128,49 +127,6 @@ impl SemanticIcpServer {
             counts: ServerCounts::default(),
             options,
         }
-    }
-
-    /// Leaves keyframes out after `hurry`.
-    pub fn hurried_by(mut self, hurry: &Hurry) -> Self {
-        self.follower = self.follower.hurried_by(hurry);
-        self
-    }
-
-    /// Handles one keyframe chunk of the map.
-    pub fn on_map(&mut self, message: &LatticeMap, now_ns: i64) -> Vec<Output> {
-        let followed = self.follower.on_map(message);
-        self.followed(followed, now_ns)
-    }
-
-    /// Handles one update chunk of the map.
-    pub fn on_map_update(&mut self, message: &LatticeMapUpdate, now_ns: i64) -> Vec<Output> {
-        let followed = self.follower.on_update(message);
-        self.followed(followed, now_ns)
-    }
-
-    fn followed(&mut self, followed: Result<Followed, FollowError>, now_ns: i64) -> Vec<Output> {
-        let mut out = Vec::new();
-        match followed {
-            Ok(Followed::NeedKeyframe) => out.push(Output::NeedKeyframe),
-            Ok(_) => {}
-            Err(error) => {
-                log::debug!("map message rejected: {error}");
-                self.counts.map_refused += 1;
-            }
-        }
-        let (_, replaced) = self.follower.take_touched();
-        self.reset_label_confusion |= replaced;
-        if replaced && self.prepared.is_some() {
-            // Its frame may differ.
-            self.forget("the map is a new one", now_ns, &mut out);
-        }
-        out
-    }
-
-    /// Requests a keyframe if an incomplete one has timed out. To be called once a second.
-    pub fn check_keyframe_timeout(&mut self) -> Option<Output> {
-        let overdue = self.follower.check_keyframe_timeout();
-        overdue.then_some(Output::NeedKeyframe)
     }
 
     /// Handles the class names of the headset. Other names mean another segmenter, whose label confusions
@@ -366,20 +322,6 @@ impl SemanticIcpServer {
     /// Name of a class of the headset, if known.
     pub fn class_name(&self, class: u16) -> Option<&str> {
         self.names.get(&class).map(String::as_str)
-    }
-
-    /// Number of detected differences from the mapper's map.
-    pub fn map_differences(&self) -> u64 {
-        self.follower.differences()
-    }
-
-    /// Number of voxels of the followed map; 0 before its first keyframe.
-    pub fn map_voxels(&self) -> usize {
-        self.follower.map().map_or(0, |map| map.voxels().len())
-    }
-
-    fn has_map(&self) -> bool {
-        self.map_voxels() > 0
     }
 
     fn transform(&self, current: &CurrentCalibration, now_ns: i64) -> TransformStamped {
