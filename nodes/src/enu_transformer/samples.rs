@@ -84,30 +84,37 @@ impl Samples {
     }
 
     fn thin(&mut self) {
+        if self.kept.len() <= self.limit {
+            return;
+        }
         while self.kept.len() > self.limit {
             self.thinning += 1;
             let thinning = self.thinning;
             self.kept
                 .retain(|(number, _, _)| Self::is_kept(*number, thinning));
         }
+        self.leave_poses_out();
+    }
+
+    /// Leaves out the poses of points that were thinned out.
+    fn leave_poses_out(&mut self) {
+        let mut places: BTreeMap<u32, u32> = BTreeMap::new();
+        let mut poses = Vec::new();
+        for (_, place, _) in &mut self.kept {
+            *place = *places.entry(*place).or_insert_with(|| {
+                poses.extend(self.poses.get(*place as usize).copied());
+                poses.len().saturating_sub(1) as u32
+            });
+        }
+        self.poses = poses;
     }
 
     fn finish(self) -> LogSamples {
-        // Poses of points that were thinned out are left out.
-        let mut places: BTreeMap<u32, u32> = BTreeMap::new();
-        let mut poses = Vec::new();
-        let mut points = Vec::with_capacity(self.kept.len());
-        for (_, place, point) in self.kept {
-            let place = *places.entry(place).or_insert_with(|| {
-                poses.extend(self.poses.get(place as usize).copied());
-                poses.len().saturating_sub(1) as u32
-            });
-            points.push((place, point));
-        }
+        let points = self.kept.into_iter();
         LogSamples {
             samples: MountSamples {
-                poses,
-                points,
+                poses: self.poses,
+                points: points.map(|(_, place, point)| (place, point)).collect(),
                 sensor_m: self.sensor_sum_m / f64::from(self.clouds.max(1)),
             },
             mounts: self.mounts,
@@ -223,5 +230,39 @@ impl EnuTransformer {
             is_moving: false,
         });
         Ok(base_from_sensor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_and_poses_stay_within_the_limit_and_belong_together() {
+        let mut samples = Samples {
+            limit: 100,
+            ..Samples::default()
+        };
+        for number in 0..100_000_u32 {
+            if !Samples::is_kept(number.into(), samples.thinning) {
+                continue;
+            }
+            samples.poses.push(BasePose {
+                stamp_s: f64::from(number),
+                map_from_base: Isometry3::identity(),
+                velocity_m_per_s: Vector3::zeros(),
+                rate_rad_per_s: Vector3::zeros(),
+            });
+            let place = samples.poses.len() as u32 - 1;
+            let point = Vector3::x() * f64::from(number);
+            samples.kept.push((number.into(), place, point));
+            samples.thin();
+            assert!(samples.kept.len() <= 100 && samples.poses.len() <= 100);
+        }
+        let MountSamples { poses, points, .. } = samples.finish().samples;
+        assert!(points.len() > 20);
+        for (place, point) in points {
+            assert_eq!(poses[place as usize].stamp_s, point.x);
+        }
     }
 }
