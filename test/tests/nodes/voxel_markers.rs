@@ -116,8 +116,9 @@ fn a_publisher_that_has_to_end_draws_nothing_and_names_the_rest() {
     bench.markers = bench.markers.hurried_by(&hurry);
     let cells = plane(150_000);
     bench.mapper.on_cloud(&cloud("map", 1, &cells)).unwrap();
-    for chunk in bench.mapper.take_update() {
-        bench.markers.on_update(&chunk).unwrap();
+    bench.mapper.take_update();
+    for chunk in bench.mapper.keyframe() {
+        bench.markers.on_map(&chunk).unwrap();
     }
     let waiting = bench.markers.unplaced();
     assert!(waiting > 0 && bench.markers.is_dirty());
