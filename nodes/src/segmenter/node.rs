@@ -76,7 +76,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     });
     Ok(Box::new(move || {
         drop((images, looks));
-        compute.finish_within(Event::Finish, MAX_LAST_INFERENCE, interrupt);
+        compute.finish_hurrying(Event::Finish, MAX_LAST_INFERENCE, interrupt);
         Box::new(())
     }))
 }

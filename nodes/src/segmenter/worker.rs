@@ -170,7 +170,7 @@ impl Worker {
     /// Labels the waiting image if the network is fast enough, and ends the thread.
     pub fn finish(self) {
         self.compute
-            .finish_within(Event::Finish, MAX_LAST_INFERENCE, self.interrupt);
+            .finish_hurrying(Event::Finish, MAX_LAST_INFERENCE, self.interrupt);
     }
 }
 
