@@ -12,15 +12,16 @@ impl LatticeMapper {
     /// It may contain changes that the next update repeats: updates carry states, not
     /// differences, so applying both is harmless.
     pub fn keyframe(&mut self) -> Vec<LatticeMap> {
-        self.counts.keyframes += 1;
         let stamp = self.stamp();
-        match &self.occupancy {
+        let chunks = match &self.occupancy {
             Some(cells) => {
                 let keys = cells.sorted_keys();
                 map::keyframe_of_cells(cells.lattice(), cells.datum_m(), &keys, &stamp)
             }
             None => map::keyframe(&self.list, &stamp),
-        }
+        };
+        self.counts.keyframes += u64::from(!chunks.is_empty());
+        chunks
     }
 
     /// Free cells in self-contained chunks like those of a map; `None` if none are kept.

@@ -105,6 +105,7 @@ impl MapFollower {
         if !map.replace(done.voxels, &mut self.touched, &self.hurry) {
             return Ok(Followed::LeftOut);
         }
+        self.compact_above = self.compact_above.max(2 * self.touched.len());
         if self.sequence.is_none_or(|at| done.sequence > at) {
             self.keyframe_ns = Some(map.stamp_ns);
             (self.sequence, self.history) = (Some(done.sequence), done.history);

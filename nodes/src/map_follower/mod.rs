@@ -27,6 +27,8 @@ const MAX_STAGING_UPDATES: u64 = 10;
 const MAX_OLD_UPDATES: u32 = 128;
 /// Longest delay of an update that a later update or keyframe has overtaken, s.
 const MAX_OVERTAKEN_S: u32 = 5;
+/// Touched keys that may be kept with repetitions: half a megabyte.
+const COMPACT_ABOVE: usize = 1 << 16;
 /// Seconds without a chunk after which the rest of a keyframe counts as lost, initially and at most: a
 /// mapper with a long update period must not receive repeated requests.
 const PATIENCE_S: [u32; 2] = [2, 64];
@@ -55,6 +57,8 @@ pub struct MapFollower {
     staging: Option<Staging>,
     open_updates: BTreeMap<u64, OpenUpdate>,
     touched: Vec<MortonKey>,
+    /// Number of touched keys above which repeated ones are left out.
+    compact_above: usize,
     replaced: bool,
     /// A keyframe is needed and has not arrived.
     keyframe_needed: bool,
@@ -83,6 +87,7 @@ impl MapFollower {
             staging: None,
             open_updates: BTreeMap::new(),
             touched: Vec::new(),
+            compact_above: COMPACT_ABOVE,
             replaced: false,
             keyframe_needed: false,
             too_large: None,
@@ -140,6 +145,7 @@ impl MapFollower {
     /// Keys of voxels added, changed or removed since the last call, some more than once, and true if lattice,
     /// epoch or datum are new (then all of the old map is obsolete).
     pub fn take_touched(&mut self) -> (Vec<MortonKey>, bool) {
+        self.compact_above = COMPACT_ABOVE;
         (
             std::mem::take(&mut self.touched),
             std::mem::take(&mut self.replaced),
@@ -188,6 +194,7 @@ impl MapFollower {
         // Updates are applied only after the first keyframe is complete.
         if self.sequence.is_some() {
             map.apply(&changes, self.max_voxels, &mut self.touched)?;
+            self.compact();
         }
         if let Some(staging) = &mut self.staging
             && !staging.keep(changes, self.max_voxels)
@@ -247,6 +254,15 @@ impl MapFollower {
             self.patience_s = (2 * self.patience_s).min(PATIENCE_S[1]);
         }
         overdue
+    }
+
+    /// Leaves out touched keys that are repeated, once they have doubled: a chunk may come any number of times.
+    fn compact(&mut self) {
+        if self.touched.len() > self.compact_above {
+            self.touched.sort_unstable();
+            self.touched.dedup();
+            self.compact_above = COMPACT_ABOVE.max(2 * self.touched.len());
+        }
     }
 
     fn need_keyframe(&mut self) -> Followed {

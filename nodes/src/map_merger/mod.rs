@@ -194,11 +194,12 @@ impl MapMerger {
 
     /// The whole map in self-contained chunks; empty before the first robot's map.
     pub fn keyframe(&mut self) -> Vec<LatticeMap> {
-        self.counts.keyframes += 1;
-        match &self.union {
+        let chunks = match &self.union {
             Some(union) => map::keyframe(union, &self.stamp()),
             None => Vec::new(),
-        }
+        };
+        self.counts.keyframes += u64::from(!chunks.is_empty());
+        chunks
     }
 
     /// Adopts the lattice of the first robot's map, else checks compatibility with the merged one.

@@ -95,6 +95,24 @@ fn a_follower_that_has_to_end_leaves_keyframes_out_and_takes_updates() {
     assert_same(&follower, &mapper);
 }
 
+/// A chunk of an update that never becomes complete fills no memory, however often it comes.
+#[test]
+fn a_repeated_chunk_is_kept_once() {
+    let mut mapper = mapper(LatticeKind::Fcc);
+    let mut follower = maps::follower(&mut mapper);
+    insert(&mut mapper, &scatter(1, 1000, [0.0; 3], 100.0));
+    let mut chunk = mapper.take_update().swap_remove(0);
+    chunk.chunks += 1;
+    for count in 1..300 {
+        chunk.counts.fill(count);
+        follower.on_update(&chunk).unwrap();
+    }
+    let (touched, _) = follower.take_touched();
+    let keys: std::collections::BTreeSet<_> = touched.iter().collect();
+    assert!(keys.len() >= 500, "{}", keys.len());
+    assert!(touched.len() <= 1 << 16, "{}", touched.len());
+}
+
 #[test]
 fn a_late_joiner_takes_the_keyframe_and_then_deltas() {
     let mut mapper = mapper(LatticeKind::Bcc);
