@@ -8,6 +8,7 @@ use lattice_nodes::replay::{self, Slice, TopicPlan};
 
 use super::Replay;
 use crate::CliResult;
+use crate::progress::Progress;
 
 /// Part of a log that is read, s.
 pub const CHECK_S: f64 = 60.0;
@@ -106,8 +107,15 @@ impl Replay {
             to_s: self.slice().to_s.min(from_s + CHECK_S),
         };
         let transformer = self.transformer(plan)?;
-        let (log, _) =
-            replay::mount_samples(bag, plan, &slice, transformer, CHECK_POINTS, &mut |_| ())?;
+        let progress = Progress::new("check");
+        let tell = &mut |done| progress.set(done);
+        // The replay itself warns of what it leaves out.
+        let level = log::max_level();
+        log::set_max_level(log::LevelFilter::Off);
+        let found = replay::mount_samples(bag, plan, &slice, transformer, CHECK_POINTS, tell);
+        log::set_max_level(level);
+        progress.done();
+        let (log, _) = found?;
         let options = MountOptions::default();
         let log_name = self.bag.display();
         let remedy =
