@@ -126,9 +126,10 @@ fn check_frames(parts: &[Part]) -> Result {
         .filter(is_own)
         .map(|part| (part.info.source.sha256.as_str(), part))
         .collect();
-    let common = parts
-        .iter()
-        .find(|part| !is_own(part) && !part.info.source.placed);
+    let common = parts.iter().find(|part| {
+        let is_anchor = part.info.map.origin.is_some() || !part.info.source.placed;
+        !is_own(part) && is_anchor
+    });
     // One log without an origin may be the map frame in which others were placed.
     let mut frames = own.into_values().chain(common);
     let (Some(part), Some(other)) = (frames.next(), frames.next()) else {

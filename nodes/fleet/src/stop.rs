@@ -143,6 +143,14 @@ pub fn handle_signals() -> io::Result<()> {
     Ok(())
 }
 
+/// Waits for the end of the process if a signal has begun it.
+pub fn wait_if_stopping() {
+    let is_stopping = held().get_or_insert_default().is_stopping;
+    while is_stopping {
+        std::thread::park();
+    }
+}
+
 fn end(signal: i32) {
     let folders = {
         let mut held = held();

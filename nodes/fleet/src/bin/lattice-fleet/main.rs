@@ -61,6 +61,7 @@ fn main() -> ExitCode {
         #[cfg(feature = "ballista")]
         Command::Serve(command) => command.run(),
     };
+    lattice_fleet::stop::wait_if_stopping();
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
