@@ -145,8 +145,7 @@ pub fn handle_signals() -> io::Result<()> {
 
 /// Waits for the end of the process if a signal has begun it.
 pub fn wait_if_stopping() {
-    let is_stopping = held().get_or_insert_default().is_stopping;
-    while is_stopping {
+    while held().get_or_insert_default().is_stopping {
         std::thread::park();
     }
 }
