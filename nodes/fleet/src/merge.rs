@@ -342,6 +342,7 @@ mod tests {
             slice_s: (0.0, None),
             settings: Vec::new(),
             program: String::new(),
+            placed: false,
         };
         let tile = TileInfo {
             tile: 7,
