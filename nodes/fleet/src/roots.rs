@@ -80,7 +80,7 @@ mod tests {
         fs::write(outer.join("secret"), "x").unwrap();
         fs::write(log.join("log.mcap"), "x").unwrap();
         fs::create_dir_all(outer.join("r\u{f6}\u{f6}t #1 50% [a]b")).unwrap();
-        let roots = Roots::new(&[root.clone()]).unwrap();
+        let roots = Roots::new(std::slice::from_ref(&root)).unwrap();
         roots.admit_log(&log).unwrap();
         for outside in [
             outer.join("secret"),
