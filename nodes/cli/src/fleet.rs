@@ -1,8 +1,9 @@
-//! `lattice fleet`: runs the separate program `lattice-fleet`.
+//! `lattice fleet`: executes the separate program `lattice-fleet`.
 
 use std::ffi::OsString;
 use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::Args;
@@ -28,34 +29,49 @@ pub struct Fleet {
 impl Fleet {
     /// Runs the command.
     pub fn run(self) -> CliResult {
-        run(self.arguments)
+        execute(self.arguments)
     }
 
     /// Runs a command of `lattice-fleet` under another name.
     pub fn run_as(self, command: &str) -> CliResult {
         let mut arguments = vec![command.into()];
         arguments.extend(self.arguments);
-        run(arguments)
+        execute(arguments)
     }
+}
+
+/// Replaces this process by `lattice-fleet`, which then receives its signals. Returns if that fails.
+fn execute(arguments: Vec<OsString>) -> CliResult {
+    let program = program();
+    let error = Command::new(&program).args(&arguments).exec();
+    Err(not_started(&program, &error).into())
 }
 
 /// Runs `lattice-fleet` with these arguments and waits for it.
 pub fn run(arguments: Vec<OsString>) -> CliResult {
-    let program = beside_this().unwrap_or_else(|| PROGRAM.into());
+    let program = program();
     let status = Command::new(&program).args(&arguments).status();
-    let status = status.map_err(|error| match error.kind() {
-        ErrorKind::NotFound => format!(
-            "the program {PROGRAM} with the data engine is not installed; it is built separately: \
-             cargo install --path nodes/fleet"
-        ),
-        _ => format!("{}: {error}", program.display()),
-    })?;
+    let status = status.map_err(|error| not_started(&program, &error))?;
     match status.code() {
         Some(0) => Ok(()),
         // The program has printed the reason.
         Some(code) => std::process::exit(code),
         None => Err(format!("{PROGRAM} was killed: {status}").into()),
     }
+}
+
+fn not_started(program: &Path, error: &std::io::Error) -> String {
+    match error.kind() {
+        ErrorKind::NotFound => format!(
+            "the program {PROGRAM} with the data engine is not installed; it is built separately: \
+             cargo install --path nodes/fleet"
+        ),
+        _ => format!("{}: {error}", program.display()),
+    }
+}
+
+fn program() -> PathBuf {
+    beside_this().unwrap_or_else(|| PROGRAM.into())
 }
 
 /// The program beside this one, if it exists.

@@ -1,8 +1,8 @@
-//! Alignment of logs with a merged map: a correction of each log's poses is proposed, with a verdict.
+//! Alignment of logs with a merged map: a proposed correction of each log's poses, with a verdict.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use lattice_core::lattice::MortonKey;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
@@ -13,9 +13,10 @@ use crate::Result;
 use crate::corrections::{Action, Correction, Corrections, Found, VERSION};
 use crate::files::{at, write_whole};
 use crate::merged::Merged;
-use crate::part::TileInfo;
+use crate::stop::{self, Scratch};
 use crate::tables::{Part, Tables, read_map};
-use crate::tile::Tile;
+use crate::tile::{TILE_LOG2, Tile};
+use crate::tile_files::TileInfo;
 
 /// Options of an alignment.
 #[derive(Clone, Debug)]
@@ -24,16 +25,16 @@ pub struct AlignOptions {
     pub program: PathBuf,
     /// Profile of `lattice calibrate`.
     pub profile: String,
-    /// Farther than this nothing is moved, m.
+    /// Largest move of a corner of the log's box, m.
     pub max_move_m: f64,
-    /// Farther than this nothing is turned, degrees.
+    /// Largest rotation, degrees.
     pub max_turn_deg: f64,
-    /// Logs that would move less are kept as they are; none: a quarter of the side of a cell, m.
+    /// Smallest move, m; none: a quarter of the cell size.
     pub min_move_m: Option<f64>,
 }
 
-/// Proposes a correction for each log of which `tables` has parts, by the merged map in the folder
-/// `reference`, which must have been made without these parts.
+/// Proposes a correction for each log that has parts in `tables`. The reference is a folder with a merged map that holds
+/// none of these parts.
 ///
 /// `progress` gets the number of logs that are done.
 pub fn align(
@@ -65,18 +66,20 @@ pub fn count_logs(tables: &Tables) -> Result<usize> {
     Ok(digests.len())
 }
 
-/// The parts by log; fails for those that the reference holds or that are corrected already.
+/// The parts by log. Fails for parts in the reference and for corrected ones.
 fn logs_of(tables: &Tables, merged: &Merged) -> Result<BTreeMap<String, Vec<Part>>> {
     let mut logs: BTreeMap<String, Vec<Part>> = BTreeMap::new();
     for part in tables.parts()? {
         let source = &part.info.source;
         let refuse = |reason: &str| Err(at(&part.folder, format!("{}: {reason}", source.path)));
         if source.kind != "log" {
-            return refuse("it is a map, whose poses are gone; align logs");
+            return refuse("a map file has no poses to correct; align logs");
         }
         let mut settings = source.settings.iter();
         if settings.any(|text| text.contains("correction.")) {
-            return refuse("it is corrected already; align the log as it is");
+            return refuse(
+                "it is corrected already; align the log as it was mapped without corrections",
+            );
         }
         if merged.parts.contains(&part.name) {
             return refuse(
@@ -90,12 +93,12 @@ fn logs_of(tables: &Tables, merged: &Merged) -> Result<BTreeMap<String, Vec<Part
         logs.entry(source.sha256.clone()).or_default().push(part);
     }
     match logs.is_empty() {
-        true => Err(at(tables.folder(), "no part of a log")),
+        true => Err(at(tables.folder(), "no part is of a log")),
         false => Ok(logs),
     }
 }
 
-/// The part of the report of `lattice calibrate --json` that is read.
+/// Members of the report of `lattice calibrate --json`.
 #[derive(Deserialize)]
 struct Answer {
     verdict: String,
@@ -139,15 +142,9 @@ fn correction(
         log: log.unwrap_or_default(),
         ..Correction::default()
     };
-    let near = near(merged, parts);
-    if near.is_empty() {
-        entry.reason = "no tile of the reference is near".into();
-        return Ok(entry);
-    }
-    let scratch = tables.scratch_folder();
-    let scratch = tempfile::tempdir_in(&scratch).map_err(|error| at(&scratch, error))?;
+    let parent = tables.scratch_folder();
+    let scratch = Scratch::create(&parent, ".align-").map_err(|error| at(&parent, error))?;
     let map = scratch.path().join("reference.lat");
-    write(&read_map(reference, &merged.map, &near)?, &map)?;
     let mut corners = Corners::default();
     let mut command = Command::new(&options.program);
     command.arg("calibrate").arg("--map").arg(&map);
@@ -164,6 +161,12 @@ fn correction(
     let turn_rad = options.max_turn_deg.to_radians();
     // The rotation is about the origin of the map, from which the log may be far away.
     let radius_m = options.max_move_m + turn_rad * corners.farthest_m();
+    let near = near(merged, parts, radius_m);
+    if near.is_empty() {
+        entry.reason = format!("no tile of the reference is within {radius_m:.1} m");
+        return Ok(entry);
+    }
+    write(&read_map(reference, &merged.map, &near)?, &map)?;
     command.args([
         "--json",
         "--profile",
@@ -173,12 +176,12 @@ fn correction(
     ]);
     command.args(["--guess-radius", &radius_m.to_string()]);
     command.args(["--guess-yaw", &turn_rad.to_string()]);
-    judge(&mut entry, &answer_of(command)?, &corners, merged, options);
+    decide(&mut entry, &answer_of(command)?, &corners, merged, options);
     Ok(entry)
 }
 
-/// Fills in the action, and the correction where there is one.
-fn judge(
+/// Sets the action, and the correction if there is one.
+fn decide(
     entry: &mut Correction,
     answer: &Answer,
     corners: &Corners,
@@ -214,8 +217,8 @@ fn judge(
     } else if largest_move_m > options.max_move_m || turn_deg > options.max_turn_deg {
         let (max_m, max_deg) = (options.max_move_m, options.max_turn_deg);
         entry.reason = format!(
-            "it would move by {largest_move_m:.2} m and turn by {turn_deg:.2} degrees, and at most {max_m} m and \
-             {max_deg} degrees are taken"
+            "it would move by {largest_move_m:.2} m and turn by {turn_deg:.2} degrees, above the limits of {max_m} m \
+             (`--max-move`) and {max_deg} degrees (`--max-turn`)"
         );
         Action::LeaveOut
     } else if largest_move_m < min_move_m {
@@ -231,18 +234,25 @@ fn judge(
     }
 }
 
-/// The tiles of the merged map in which the parts have cells, and those beside them.
-fn near(merged: &Merged, parts: &[Part]) -> Vec<TileInfo> {
+/// The tiles of the merged map within some distance of the cells of the parts.
+fn near(merged: &Merged, parts: &[Part], radius_m: f64) -> Vec<TileInfo> {
     let place = |tile: Tile| Some(MortonKey::from_raw(u64::try_from(tile).ok()?)?.unpack());
     let tiles = parts.iter().flat_map(|part| &part.info.tiles);
     let places: BTreeSet<_> = tiles.filter_map(|tile| place(tile.tile)).collect();
-    let beside = |[x, y, z]: [i32; 3]| {
-        let steps = || -1..=1;
-        steps().any(|i| steps().any(|j| steps().any(|k| places.contains(&[x + i, y + j, z + k]))))
+    let side_m = merged.map.shortest_step_m() * f64::from(1 << TILE_LOG2);
+    let reach = (radius_m / side_m).ceil().max(1.0);
+    let is_near = |[x, y, z]: [i32; 3]| {
+        let distance = |a: i32, b: i32| (f64::from(a) - f64::from(b)).abs();
+        let mut distances = places.iter().map(|place| {
+            distance(x, place[0])
+                .max(distance(y, place[1]))
+                .max(distance(z, place[2]))
+        });
+        distances.any(|tiles| tiles <= reach)
     };
     let tiles = merged.tiles.iter().map(|tile| &tile.files);
     tiles
-        .filter(|tile| place(tile.tile).is_some_and(beside))
+        .filter(|tile| place(tile.tile).is_some_and(is_near))
         .cloned()
         .collect()
 }
@@ -257,13 +267,10 @@ fn write(map: &MapContents, path: &Path) -> Result {
     })
 }
 
-/// The report of `lattice calibrate`, which ends with an error where the verdict is not OK.
-fn answer_of(mut command: Command) -> Result<Answer> {
+/// The report of `lattice calibrate`, which fails for other verdicts than OK.
+fn answer_of(command: Command) -> Result<Answer> {
     let program = PathBuf::from(command.get_program());
-    let output = command
-        .stdin(Stdio::null())
-        .output()
-        .map_err(|error| at(&program, error))?;
+    let output = stop::output_of(command).map_err(|error| at(&program, error))?;
     serde_json::from_slice(&output.stdout).map_err(|error| {
         let said = String::from_utf8_lossy(&output.stderr);
         let said = said.trim().lines().last().unwrap_or_default();

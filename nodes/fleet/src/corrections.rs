@@ -20,13 +20,13 @@ pub struct Corrections {
     pub logs: Vec<Correction>,
 }
 
-/// Correction of a log: `corrected_from_map`, which moves all of its poses in the map frame.
+/// Correction of a log: `corrected_from_map`, applied to all of its poses in the map frame.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Correction {
     /// Path of the log.
     pub log: String,
-    /// SHA-256 of its files, or empty: not compared.
+    /// SHA-256 of its files; not compared if empty.
     #[serde(default)]
     pub sha256: String,
     /// Treatment of the log.
@@ -37,7 +37,7 @@ pub struct Correction {
     /// Rotation about the origin of the map before it: fixed-axis roll, pitch, yaw.
     #[serde(default)]
     pub rpy_rad: [f64; 3],
-    /// Findings of the registration, for the reader.
+    /// Results of the registration, for the reader.
     #[serde(default)]
     pub found: Option<Found>,
     /// Reason for the action.
@@ -49,16 +49,16 @@ pub struct Correction {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Action {
-    /// Its poses are corrected.
+    /// Mapped with corrected poses.
     Move,
-    /// It is mapped as it is.
+    /// Mapped without a correction.
     Keep,
-    /// It is not mapped.
+    /// Not mapped.
     #[default]
     LeaveOut,
 }
 
-/// Findings of a registration of a log's map with the reference.
+/// Results of the registration of a log's map with the reference.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Found {
@@ -68,9 +68,9 @@ pub struct Found {
     pub largest_move_m: f64,
     /// Angle of the rotation, degrees.
     pub turn_deg: f64,
-    /// Part of the points that lie on the reference.
+    /// Fraction of the points that lie on the reference.
     pub inlier_fraction: f64,
-    /// Probability that the answer is wrong, by the registration's own estimate.
+    /// Probability of error, as the registration estimates it.
     pub p_wrong: f64,
     /// Standard deviation of the translation, m.
     pub sigma_m: [f64; 3],
@@ -79,12 +79,15 @@ pub struct Found {
 }
 
 impl Corrections {
-    /// Reads a file; fails if a log has two entries.
+    /// Reads a file. Fails if a log has two entries.
     pub fn read(path: &Path) -> Result<Corrections> {
         let read: Corrections = read_json(path)?;
         if read.version != VERSION {
             let (is, known) = (read.version, VERSION);
-            return Err(at(path, format!("version {is}, and {known} is read")));
+            return Err(at(
+                path,
+                format!("version {is} is not supported, only {known}"),
+            ));
         }
         for (number, entry) in read.logs.iter().enumerate() {
             let same = |other: &&Correction| match entry.sha256.is_empty() {
@@ -97,15 +100,19 @@ impl Corrections {
             }
             let numbers = entry.translation_m.iter().chain(&entry.rpy_rad);
             if let Some(wrong) = numbers.into_iter().find(|number| !number.is_finite()) {
-                return Err(at(path, format!("{}: {wrong} in a correction", entry.log)));
+                let log = &entry.log;
+                return Err(at(
+                    path,
+                    format!("{log}: {wrong} in a correction is not finite"),
+                ));
             }
         }
         Ok(read)
     }
 
-    /// Options of `lattice replay` for a log, by its canonical path and its digest; fails for one that is to
-    /// be left out, and for one that has changed.
-    pub fn options_of(&self, log: &Path, sha256: &str) -> Result<Vec<String>> {
+    /// Parameters for a log, by its canonical path and its digest; none for a log without an entry. Fails for a log
+    /// to be left out, and for one that has changed.
+    pub fn params_of(&self, log: &Path, sha256: &str) -> Result<Option<Vec<String>>> {
         let by_digest = self.logs.iter().find(|entry| entry.sha256 == sha256);
         let is_there = |entry: &&Correction| {
             Path::new(&entry.log)
@@ -113,23 +120,22 @@ impl Corrections {
                 .is_ok_and(|path| path == log)
         };
         let Some(entry) = by_digest.or_else(|| self.logs.iter().find(is_there)) else {
-            return Ok(Vec::new());
+            return Ok(None);
         };
         if !entry.sha256.is_empty() && entry.sha256 != sha256 {
-            return Err("it is not the log that was aligned: its files have changed since".into());
+            return Err(
+                "the log differs from the aligned one: its files have changed since".into(),
+            );
         }
         match entry.action {
-            Action::Keep => Ok(Vec::new()),
+            Action::Keep => Ok(Some(Vec::new())),
             Action::LeaveOut => {
                 Err(format!("left out by the corrections: {}", entry.reason).into())
             }
-            Action::Move => Ok([
+            Action::Move => Ok(Some(vec![
                 format!("correction.translation_m:={:?}", entry.translation_m),
                 format!("correction.rpy_rad:={:?}", entry.rpy_rad),
-            ]
-            .into_iter()
-            .flat_map(|value| ["-p".to_owned(), value])
-            .collect()),
+            ])),
         }
     }
 }
@@ -163,16 +169,15 @@ mod tests {
             ],
         };
         let moved = [
-            "-p",
-            "correction.translation_m:=[0.5, 0.0, -1e-6]",
-            "-p",
-            "correction.rpy_rad:=[0.0, 0.0, 0.0]",
+            "correction.translation_m:=[0.5, 0.0, -1e-6]".to_owned(),
+            "correction.rpy_rad:=[0.0, 0.0, 0.0]".to_owned(),
         ];
         let other = Path::new("/other");
-        assert_eq!(corrections.options_of(other, "aa").unwrap(), moved);
-        assert!(corrections.options_of(&folder, "bb").unwrap().is_empty());
-        assert!(corrections.options_of(other, "dd").unwrap().is_empty());
-        let left_out = corrections.options_of(other, "cc").unwrap_err().to_string();
+        let params_of = |log, sha256| corrections.params_of(log, sha256).unwrap();
+        assert_eq!(params_of(other, "aa"), Some(moved.to_vec()));
+        assert_eq!(params_of(&folder, "bb"), Some(Vec::new()));
+        assert_eq!(params_of(other, "dd"), None);
+        let left_out = corrections.params_of(other, "cc").unwrap_err().to_string();
         assert!(left_out.contains("it lies elsewhere"), "{left_out}");
     }
 
@@ -185,7 +190,7 @@ mod tests {
             version: VERSION,
             logs: vec![correction(&path, "aa", Action::Move)],
         };
-        let changed = corrections.options_of(&log, "bb").unwrap_err().to_string();
+        let changed = corrections.params_of(&log, "bb").unwrap_err().to_string();
         assert!(changed.contains("changed"), "{changed}");
         corrections
             .logs

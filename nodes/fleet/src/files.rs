@@ -1,4 +1,4 @@
-//! Files that take their place whole, and digests that name them.
+//! Files that are written atomically, and digests that name them.
 
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
@@ -20,7 +20,7 @@ pub struct FileId {
 }
 
 impl FileId {
-    /// Reads a file through.
+    /// Reads a file for its size and digest.
     pub fn of(path: &Path) -> io::Result<FileId> {
         let mut file = File::open(path)?;
         let (mut digest, mut bytes) = (Sha256::new(), 0);
@@ -37,7 +37,7 @@ impl FileId {
         Ok(FileId { bytes, sha256 })
     }
 
-    /// Fails, with its path, unless a file is this one.
+    /// Fails, with its path, unless a file has this size and digest.
     pub fn verify(&self, path: &Path) -> Result {
         let found = FileId::of(path).map_err(|error| at(path, error))?;
         if found == *self {
@@ -46,7 +46,7 @@ impl FileId {
         Err(at(
             path,
             format!(
-                "damaged: {} bytes with SHA-256 {:.16}..., but it was written with {} bytes and {:.16}...",
+                "damaged: {} bytes with SHA-256 {:.16}...; its manifest has {} bytes and {:.16}...",
                 found.bytes, found.sha256, self.bytes, self.sha256
             ),
         ))
@@ -58,7 +58,7 @@ pub fn at(path: &Path, error: impl std::fmt::Display) -> AnyError {
     format!("{}: {error}", path.display()).into()
 }
 
-/// SHA-256 of some texts, in hexadecimal digits; which text ends where counts too.
+/// SHA-256 of some texts with their lengths, in hexadecimal digits.
 pub fn digest_of<'a>(texts: impl IntoIterator<Item = &'a str>) -> String {
     let mut digest = Sha256::new();
     for text in texts {
@@ -68,11 +68,16 @@ pub fn digest_of<'a>(texts: impl IntoIterator<Item = &'a str>) -> String {
     hex(&digest.finalize())
 }
 
+/// SHA-256 of a text, in hexadecimal digits.
+pub fn sha256_of(text: &str) -> String {
+    hex(&Sha256::digest(text.as_bytes()))
+}
+
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Writes a file beside its place, brings it to the disk and renames it.
+/// Writes a temporary file in the same folder, syncs it and renames it.
 pub fn write_whole(path: &Path, fill: impl FnOnce(&mut File) -> Result) -> Result {
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut file = tempfile::Builder::new()
@@ -85,7 +90,7 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&mut File) -> Result) -> Resul
     open_to_all(&file).map_err(|error| at(path, error))
 }
 
-/// The rights of any new file, not those of a temporary one.
+/// Sets the permissions of a new file, which differ from those of a temporary one.
 fn open_to_all(file: &File) -> io::Result<()> {
     use std::os::unix::fs::PermissionsExt;
     file.set_permissions(fs::Permissions::from_mode(0o644))
@@ -94,7 +99,7 @@ fn open_to_all(file: &File) -> io::Result<()> {
 /// The text of a manifest whose member `digest` is the SHA-256 of the same text with an empty one.
 pub fn sealed(text: &str) -> String {
     let empty = "\"digest\": \"\"";
-    let digest = hex(&Sha256::digest(text.as_bytes()));
+    let digest = sha256_of(text);
     text.replacen(empty, &format!("\"digest\": \"{digest}\""), 1)
 }
 
@@ -110,8 +115,8 @@ pub fn write_manifest(path: &Path, value: &impl Serialize) -> Result {
     write_whole(path, |file| Ok(file.write_all(sealed(&text).as_bytes())?))
 }
 
-/// Reads a manifest; fails, with its path, if it is of another version of the tables or a byte of it is not as it was
-/// written. `digest_of` gives its `digest`.
+/// Reads a manifest. Fails, with its path, for another version of the tables and for a text that differs from its
+/// digest. `digest_of` returns its member `digest`.
 pub fn read_manifest<T: serde::de::DeserializeOwned>(
     path: &Path,
     digest_of: impl Fn(&T) -> &str,
@@ -136,7 +141,7 @@ pub fn read_manifest<T: serde::de::DeserializeOwned>(
     }
     Err(at(
         path,
-        format!("damaged: it is not the text that its digest {digest:.16}... is of"),
+        format!("damaged: its text differs from its digest {digest:.16}..."),
     ))
 }
 
@@ -146,7 +151,7 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result {
     write_whole(path, |file| Ok(file.write_all(&text)?))
 }
 
-/// Reads a value from JSON of at most 64 MB.
+/// Reads a value from JSON of up to 64 MB.
 pub fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
     serde_json::from_slice(&read_text(path)?).map_err(|error| at(path, error))
 }

@@ -1,20 +1,24 @@
-//! The merge stage: one map of all parts, tile by tile; tiles whose parts are as before are kept.
+//! Merge stage: one map of all parts, tile by tile. Tiles whose parts are unchanged are kept.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 
 use crate::Result;
-use crate::engine::{Engine, Inputs, Limits, merge as merge_rows};
+use crate::compatibility::map_of;
+use crate::engine::{Engine, Inputs, Limits, MergedRows, merge as merge_rows};
 use crate::files::{at, digest_of, write_manifest};
 use crate::merged::{MERGED_FILE, Merged, MergedTile};
-use crate::part::{MapInfo, Statistics, TileInfo, VERSION, tile_folder, write_tile};
-use crate::rows::TileRows;
+use crate::part::{MapInfo, VERSION};
+use crate::rows::{TileRows, Totals};
+use crate::stop::Scratch;
 use crate::tables::{Part, Tables};
 use crate::tile::Tile;
+use crate::tile_files::{TileInfo, tile_folder, write_tile};
 
 /// Options of the merge stage.
 #[derive(Clone, Debug)]
@@ -25,20 +29,22 @@ pub struct MergeOptions {
     pub engine: Engine,
     /// Limits of the engine in this process.
     pub limits: Limits,
-    /// Most input rows of a query; a tile with more has a query for itself.
+    /// Largest number of input rows of a query; a tile with more has a query of its own.
     pub rows_at_once: u64,
+    /// True if logs without an origin are known to have one map frame.
+    pub same_frame: bool,
 }
 
-/// Figures of a merge.
+/// Counts of a merge.
 #[derive(Clone, Default, PartialEq, Debug, Serialize)]
 pub struct MergeReport {
     /// Parts.
     pub parts: usize,
     /// Tiles of the merged map.
     pub tiles: usize,
-    /// Tiles whose parts were as before.
+    /// Tiles whose parts were unchanged.
     pub tiles_kept: usize,
-    /// Rows of the parts in the tiles that were made.
+    /// Input rows of the tiles that were made.
     pub rows_in: u64,
     /// Voxels of the merged map.
     pub voxels: u64,
@@ -48,20 +54,22 @@ pub struct MergeReport {
     pub bytes: u64,
 }
 
-/// A tile to be made: its parts with their files of it.
+/// Sources of a tile: its parts, each with its files of the tile.
 pub type Job<'a> = Vec<(&'a Part, &'a TileInfo)>;
 
-/// Makes the merged map of the tables as it should be now; `progress` gets the share that is done.
+/// Updates the merged map of the tables; `progress` gets the fraction that is done.
+///
+/// New tiles take their place when all rows have come and agree with the manifests; until then the merged map stays as
+/// it was.
 pub async fn merge(
     tables: &Tables,
     options: &MergeOptions,
     progress: &mut dyn FnMut(f64),
 ) -> Result<MergeReport> {
     let parts = tables.parts()?;
-    let map = map_of(&parts)?;
+    let map = map_of(&parts, options.same_frame)?;
     let jobs = jobs_of(&parts);
     check_bounds(&map, &jobs)?;
-    fs::create_dir_all(&options.out).map_err(|error| at(&options.out, error))?;
     let place = options.out.join(MERGED_FILE);
     let before: Option<Merged> = match place.exists() {
         true => Some(Merged::read(&options.out)?),
@@ -84,52 +92,72 @@ pub async fn merge(
         .iter()
         .filter(|(tile, _)| !made.contains_key(tile))
         .collect();
-    let rows_of = |job: &Job| {
-        job.iter()
-            .map(|(_, tile)| tile.rows + tile.label_rows)
-            .sum::<u64>()
-    };
     let all: u64 = todo.iter().map(|(_, job)| rows_of(job)).sum();
-    let state = |made: &BTreeMap<Tile, MergedTile>| Merged {
+    let threads = options.limits.threads;
+    let created = !options.out.exists();
+    fs::create_dir_all(&options.out).map_err(|error| at(&options.out, error))?;
+    let staging = Scratch::create(&options.out, ".new-");
+    let staging = staging.map_err(|error| at(&options.out, error))?;
+    let spill = Scratch::create(&std::env::temp_dir(), "lattice-fleet-")?;
+    let session = options
+        .engine
+        .session(&options.limits, spill.path())
+        .await?;
+    let mut new: BTreeMap<Tile, MergedTile> = BTreeMap::new();
+    let mut make = async || -> Result {
+        let mut rest = &todo[..];
+        while !rest.is_empty() {
+            let mut rows = 0;
+            let fits = rest.iter().take_while(|(_, job)| {
+                rows += rows_of(job);
+                rows <= options.rows_at_once
+            });
+            let (batch, later) = rest.split_at(fits.count().clamp(1, rest.len()));
+            rest = later;
+            let inputs = inputs_of(batch, threads)?;
+            let mut tiles = merge_rows(&session, &inputs).await?;
+            let mut work = Vec::new();
+            for (tile, job) in batch {
+                let merged = tiles.remove(tile).unwrap_or_default();
+                check_read(**tile, job, &merged)?;
+                work.push((**tile, digest(job), merged.rows));
+            }
+            if let Some(tile) = tiles.keys().next() {
+                let reason =
+                    format!("the engine returned rows of tile {tile}, which was not queried");
+                return Err(reason.into());
+            }
+            for tile in write_tiles(staging.path(), work, map.labels, threads)? {
+                new.insert(tile.files.tile, tile);
+            }
+            report.rows_in += batch.iter().map(|(_, job)| rows_of(job)).sum::<u64>();
+            progress(report.rows_in as f64 / all.max(1) as f64);
+        }
+        Ok(())
+    };
+    if let Err(error) = make().await {
+        drop(staging);
+        if created {
+            // Fails for a folder with files, which stays.
+            let _ = fs::remove_dir(&options.out);
+        }
+        return Err(error);
+    }
+    for tile in new.values() {
+        take_place(staging.path(), &options.out, &tile.files)?;
+    }
+    made.extend(new);
+    let merged = Merged {
         version: VERSION,
         digest: String::new(),
-        map: map.clone(),
+        map,
         parts: parts.iter().map(|part| part.name.clone()).collect(),
         tiles: made.values().cloned().collect(),
     };
-    // Whoever stops this from here on leaves a list of tiles that are whole.
-    write_manifest(&place, &state(&made))?;
-    let session = options.engine.session(&options.limits).await?;
-    let mut rest = &todo[..];
-    while !rest.is_empty() {
-        let mut rows = 0;
-        let fits = rest.iter().take_while(|(_, job)| {
-            rows += rows_of(job);
-            rows <= options.rows_at_once
-        });
-        let (batch, later) = rest.split_at(fits.count().clamp(1, rest.len()));
-        rest = later;
-        let inputs = inputs_of(batch)?;
-        let mut tiles = merge_rows(&session, &inputs).await?;
-        let work: Vec<_> = batch
-            .iter()
-            .map(|(tile, job)| (**tile, digest(job), tiles.remove(tile).unwrap_or_default()))
-            .collect();
-        for tile in write_tiles(&options.out, work, map.labels, options.limits.threads)? {
-            made.insert(tile.files.tile, tile);
-        }
-        report.rows_in += batch.iter().map(|(_, job)| rows_of(job)).sum::<u64>();
-        if let Some(tile) = tiles.keys().next() {
-            return Err(
-                format!("the engine gave rows of tile {tile}, which was not asked for").into(),
-            );
-        }
-        progress(report.rows_in as f64 / all.max(1) as f64);
-    }
-    write_manifest(&place, &state(&made))?;
+    write_manifest(&place, &merged)?;
     remove_others(&options.out, &made)?;
     report.tiles = made.len();
-    report.points = map.statistics.points;
+    report.points = merged.map.statistics.points;
     for tile in made.values() {
         report.voxels += tile.files.rows;
         let labels = tile.files.labels.as_ref().map_or(0, |id| id.bytes);
@@ -139,7 +167,45 @@ pub async fn merge(
     Ok(report)
 }
 
-/// Sorts and writes tiles on several threads; each comes with the digest of what it was made from.
+/// Input rows of a tile.
+fn rows_of(job: &Job) -> u64 {
+    let rows = job.iter().map(|(_, tile)| tile.rows + tile.label_rows);
+    rows.sum()
+}
+
+/// Refuses the rows of a tile unless the engine has read all rows and points of its parts.
+fn check_read(tile: Tile, job: &Job, merged: &MergedRows) -> Result {
+    let mut promised = Totals::default();
+    for (_, files) in job {
+        promised.add(&files.totals());
+    }
+    let read = merged.read;
+    if read == promised {
+        return Ok(());
+    }
+    let parts = job
+        .iter()
+        .map(|(part, _)| part.folder.display().to_string());
+    let parts = parts.collect::<Vec<_>>().join(", ");
+    Err(format!(
+        "tile {tile}: the engine has read {read}, the manifests promise {promised}: {parts}; did the files change \
+         meanwhile?"
+    )
+    .into())
+}
+
+/// Moves the files of a new tile to their place.
+fn take_place(staging: &Path, out: &Path, tile: &TileInfo) -> Result {
+    let folder = tile_folder(out, tile.tile);
+    fs::create_dir_all(&folder).map_err(|error| at(&folder, error))?;
+    let (from, to) = (tile.files(staging), tile.files(out));
+    for ((from, _), (to, _)) in from.iter().zip(&to) {
+        fs::rename(from, to).map_err(|error| at(to, error))?;
+    }
+    Ok(())
+}
+
+/// Sorts and writes tiles on several threads, each with the digest of its sources.
 fn write_tiles(
     folder: &Path,
     work: Vec<(Tile, String, TileRows)>,
@@ -147,10 +213,9 @@ fn write_tiles(
     threads: usize,
 ) -> Result<Vec<MergedTile>> {
     let (work, done) = (Mutex::new(work), Mutex::new(Vec::new()));
-    let held = |list: PoisonError<_>| list.into_inner();
     let write = || {
         loop {
-            let next = work.lock().unwrap_or_else(held).pop();
+            let next = work.lock().unwrap_or_else(PoisonError::into_inner).pop();
             let Some((tile, made_from, mut rows)) = next else {
                 break;
             };
@@ -158,7 +223,7 @@ fn write_tiles(
             let files = write_tile(folder, tile, &rows, labels);
             let written = files.map(|files| MergedTile { made_from, files });
             done.lock()
-                .unwrap_or_else(|list| list.into_inner())
+                .unwrap_or_else(PoisonError::into_inner)
                 .push(written);
         }
     };
@@ -167,78 +232,11 @@ fn write_tiles(
             scope.spawn(write);
         }
     });
-    let done = done.into_inner().unwrap_or_else(|list| list.into_inner());
+    let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     done.into_iter().collect()
 }
 
-/// The map of all parts besides its rows; the least datum counts, so that no order does.
-pub fn map_of(parts: &[Part]) -> Result<MapInfo> {
-    let [first, rest @ ..] = parts else {
-        return Err("there are no parts to merge".into());
-    };
-    let mut map = first.info.map.clone();
-    let mut sums = map
-        .columns()
-        .map_err(|error| at(&first.folder, error))?
-        .statistics;
-    for part in rest {
-        let other = &part.info.map;
-        if let Some(reason) = map.contradiction(other) {
-            let (a, b) = (first.folder.display(), part.folder.display());
-            return Err(format!("{a} and {b} do not go together: {reason}").into());
-        }
-        map.origin = map.origin.or(other.origin);
-        map.datum_index = map.datum_index.min(other.datum_index);
-        sums.add(
-            &other
-                .columns()
-                .map_err(|error| at(&part.folder, error))?
-                .statistics,
-        );
-    }
-    check_slices(parts)?;
-    map.statistics = Statistics {
-        points: sums.points,
-        squares: sums.squares.to_string(),
-        distances: sums.distances.to_string(),
-        largest_square: sums.largest_square,
-    };
-    Ok(map)
-}
-
-/// Refuses parts of one log whose slices share time or whose settings differ: points would count twice.
-fn check_slices(parts: &[Part]) -> Result {
-    let mut logs = BTreeMap::<&str, Vec<&Part>>::new();
-    for part in parts.iter().filter(|part| part.info.source.kind == "log") {
-        logs.entry(&part.info.source.sha256).or_default().push(part);
-    }
-    for slices in logs.values_mut() {
-        slices.sort_by(|a, b| a.info.source.slice_s.0.total_cmp(&b.info.source.slice_s.0));
-        for pair in slices.windows(2) {
-            let [a, b] = pair else { continue };
-            let (first, second) = (&a.info.source, &b.info.source);
-            let apart = first.slice_s.1.is_some_and(|end| end <= second.slice_s.0);
-            if apart && (&first.settings, &first.program) == (&second.settings, &second.program) {
-                continue;
-            }
-            return Err(format!(
-                "{} and {} are both of log {}, slices {:?} and {:?} s, options {:?} and {:?}: \
-                 the same points would count twice; remove one",
-                a.folder.display(),
-                b.folder.display(),
-                first.path,
-                first.slice_s,
-                second.slice_s,
-                first.settings,
-                second.settings
-            )
-            .into());
-        }
-    }
-    Ok(())
-}
-
-/// Refuses what could reach beyond 64 bits, where most engines wrap around without a word.
+/// Refuses sums that could exceed 64 bits, where most engines wrap around silently.
 fn check_bounds(map: &MapInfo, jobs: &BTreeMap<Tile, Job>) -> Result {
     let reach = lattice_core::voxels::file::MapColumns::offset_reach(&map.columns()?.lattice);
     for (tile, job) in jobs {
@@ -266,7 +264,7 @@ pub fn jobs_of(parts: &[Part]) -> BTreeMap<Tile, Job<'_>> {
     jobs
 }
 
-/// Digest of what a tile is made from.
+/// Digest of the sources of a tile.
 pub fn digest(job: &Job) -> String {
     let texts = job.iter().flat_map(|(part, tile)| {
         let labels = tile.labels.as_ref().map_or("", |id| id.sha256.as_str());
@@ -275,26 +273,39 @@ pub fn digest(job: &Job) -> String {
     digest_of(texts)
 }
 
-/// Verified files of some tiles.
-fn inputs_of(jobs: &[(&Tile, &Job)]) -> Result<Inputs> {
-    let mut inputs = Inputs::default();
-    for (part, tile) in jobs.iter().flat_map(|(_, job)| job.iter()) {
-        let folder = part
-            .folder
-            .canonicalize()
-            .map_err(|error| at(&part.folder, error))?;
-        tile.verify(&folder)?;
-        tile.check_footers(&folder)?;
-        for (number, (path, _)) in tile.files(&folder).into_iter().enumerate() {
-            let path = path.into_os_string().into_string();
-            let path = path.map_err(|path| format!("{path:?} is no UTF-8"))?;
-            if number == 0 {
-                &mut inputs.voxels
-            } else {
-                &mut inputs.labels
+/// Files of some tiles, each read through on several threads and held against its manifest.
+fn inputs_of(jobs: &[(&Tile, &Job)], threads: usize) -> Result<Inputs> {
+    let files: Vec<_> = jobs.iter().flat_map(|(_, job)| job.iter()).collect();
+    let (next, wrong) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
+    let check = || {
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            let Some((part, tile)) = files.get(number) else {
+                break;
+            };
+            if let Err(error) = tile.check(&part.folder, &part.info.map) {
+                next.fetch_max(files.len(), Ordering::Relaxed);
+                let mut wrong = wrong.lock().unwrap_or_else(PoisonError::into_inner);
+                wrong.insert(number, error);
             }
-            .push(path);
         }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..threads.clamp(1, files.len().max(1)) {
+            scope.spawn(check);
+        }
+    });
+    let wrong = wrong.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, error)) = wrong.into_iter().next() {
+        return Err(error);
+    }
+    let mut inputs = Inputs::default();
+    for (part, tile) in files {
+        let folder = part.folder.canonicalize();
+        let folder = folder.map_err(|error| at(&part.folder, error))?;
+        let mut files = tile.files(&folder).into_iter().map(|(path, _)| path);
+        inputs.voxels.extend(files.next());
+        inputs.labels.extend(files);
     }
     Ok(inputs)
 }
@@ -331,11 +342,14 @@ mod tests {
             slice_s: (0.0, None),
             settings: Vec::new(),
             program: String::new(),
+            placed: false,
         };
         let tile = TileInfo {
             tile: 7,
             rows: 1,
+            points: max_count as u64,
             label_rows: 0,
+            labelled_points: 0,
             max_count,
             voxels: Default::default(),
             labels: None,
@@ -357,7 +371,7 @@ mod tests {
     fn sums_that_could_wrap_around_are_refused_with_the_numbers() {
         let bound = |counts: &[i64]| {
             let parts: Vec<_> = counts.iter().map(|count| part(*count)).collect();
-            check_bounds(&map_of(&parts).unwrap(), &jobs_of(&parts))
+            check_bounds(&map_of(&parts, false).unwrap(), &jobs_of(&parts))
         };
         assert!(bound(&[1 << 40, 1 << 40]).is_ok());
         let error = bound(&[1 << 43, 1 << 43]).unwrap_err().to_string();

@@ -7,10 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::Result;
 use crate::files::{at, read_manifest};
-use crate::part::{MapInfo, TileInfo, contradiction_of};
+use crate::part::MapInfo;
 use crate::tables::read_map;
+use crate::tile_files::{TileInfo, contradiction_of};
 
-/// Name of the file that says what a merged map holds.
+/// Name of the manifest of a merged map.
 pub const MERGED_FILE: &str = "merged.json";
 
 /// Contents of a merged map, and the source of each tile.
@@ -30,7 +31,7 @@ pub struct Merged {
 }
 
 impl Merged {
-    /// The manifest of a folder with a merged map; fails, with its path, if it is damaged or contradicts itself.
+    /// Reads the manifest of a merged map. Fails, with its path, if it is damaged or contradicts itself.
     pub fn read(folder: &Path) -> Result<Merged> {
         let place = folder.join(MERGED_FILE);
         let merged: Merged = read_manifest(&place, |merged: &Merged| &merged.digest)?;
@@ -46,13 +47,13 @@ impl Merged {
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MergedTile {
-    /// Digest of the names and files of the parts that it was made from.
+    /// Digest of the names and files of its parts.
     pub made_from: String,
     /// Its files.
     pub files: TileInfo,
 }
 
-/// The merged map of a folder as the columns of a map file; fails if it is not finished.
+/// Reads the merged map of a folder.
 pub fn read_merged(folder: &Path) -> Result<MapContents> {
     let merged = Merged::read(folder)?;
     let tiles: Vec<_> = merged.tiles.iter().map(|tile| tile.files.clone()).collect();

@@ -1,4 +1,4 @@
-//! Rows of the tables: from the columns of a map, to and from Arrow.
+//! Rows of the tables: conversion from and to the columns of a map, and Arrow.
 
 use std::sync::Arc;
 
@@ -42,6 +42,50 @@ pub struct TileRows {
     pub labels: Vec<LabelRow>,
 }
 
+/// Totals of the rows of a tile.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
+pub struct Totals {
+    /// Rows of `voxels`.
+    pub rows: i128,
+    /// Sum of their counts; 0 where none are kept.
+    pub points: i128,
+    /// Rows of `labels`.
+    pub label_rows: i128,
+    /// Sum of their counts.
+    pub labelled_points: i128,
+}
+
+impl Totals {
+    /// Adds rows of `voxels` with the sum of their counts.
+    pub fn add_voxels(&mut self, rows: i64, points: i64) {
+        self.rows += i128::from(rows);
+        self.points += i128::from(points);
+    }
+
+    /// Adds rows of `labels` with the sum of their counts.
+    pub fn add_labels(&mut self, rows: i64, points: i64) {
+        self.label_rows += i128::from(rows);
+        self.labelled_points += i128::from(points);
+    }
+
+    /// Adds the totals of another part.
+    pub fn add(&mut self, other: &Totals) {
+        self.rows += other.rows;
+        self.points += other.points;
+        self.label_rows += other.label_rows;
+        self.labelled_points += other.labelled_points;
+    }
+}
+
+impl std::fmt::Display for Totals {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let (rows, points) = (self.rows, self.points);
+        write!(f, "{rows} rows of {points} points")?;
+        let (rows, points) = (self.label_rows, self.labelled_points);
+        write!(f, " and {rows} labels of {points} points")
+    }
+}
+
 impl TileRows {
     /// Sorts by cell, and labels of a cell by label.
     pub fn sort(&mut self) {
@@ -49,6 +93,18 @@ impl TileRows {
             .sort_by_cached_key(|row| order_in_tile(row.cell));
         let key = |row: &LabelRow| (order_in_tile(row.cell), row.label);
         self.labels.sort_by_cached_key(key);
+    }
+
+    /// Totals of the rows.
+    pub fn totals(&self) -> Totals {
+        let mut totals = Totals::default();
+        for row in &self.voxels {
+            totals.add_voxels(1, row.sums.map_or(0, |[count, ..]| count));
+        }
+        for row in &self.labels {
+            totals.add_labels(1, row.n);
+        }
+        totals
     }
 
     /// The largest count of points; 0 where none are kept.
@@ -99,7 +155,7 @@ pub fn of_map(map: &MapColumns) -> Result<Vec<(Tile, TileRows)>> {
         let Some((cell, tile)) = tile else {
             let (datum, w) = (map.datum_index, key.unpack());
             return Err(format!(
-                "cell {w:?} of datum {datum:?} is more than 2^28 cells from the origin of the map: too far for tables"
+                "cell {w:?} of datum {datum:?} is more than 2^28 cells from the origin of the map, the limit of tables"
             )
             .into());
         };
@@ -130,7 +186,7 @@ fn absolute(datum: [i64; 3], key: MortonKey) -> Option<[i64; 3]> {
     Some([x?, y?, z?])
 }
 
-/// Columns of a map without rows yet, to which tiles are added.
+/// Columns of a map, to which tiles are added.
 pub struct MapOfTiles {
     map: MapColumns,
     /// Rows and their cells, in no order yet.
@@ -139,7 +195,7 @@ pub struct MapOfTiles {
 }
 
 impl MapOfTiles {
-    /// Begins with what a map has besides its rows; `map` says by empty columns which are kept.
+    /// Starts with a map without rows, which has empty columns for counts, stamps and labels that are kept.
     pub fn new(map: MapColumns) -> MapOfTiles {
         MapOfTiles {
             map,
@@ -171,13 +227,13 @@ impl MapOfTiles {
         };
         key.ok_or_else(|| {
             format!(
-                "cell {cell:?} is more than 2^20 cells from datum {datum:?}, farther than a map file counts"
+                "cell {cell:?} is more than 2^20 cells from datum {datum:?}, the limit of a map file"
             )
             .into()
         })
     }
 
-    /// The columns; counts beyond 2^32 - 1 stay there, which in a map file stands for that or more.
+    /// The columns. Counts are clamped to 2^32 - 1, which stands for that or more in a map file.
     pub fn finish(mut self) -> Result<MapColumns> {
         self.rows.sort_unstable_by_key(|(key, _)| *key);
         self.labels
@@ -206,8 +262,12 @@ impl MapOfTiles {
             }
             let mut known = Vec::new();
             while let Some((_, row)) = labels.next_if(|(of, _)| of == key) {
-                let label = u16::try_from(row.label)
-                    .map_err(|_| format!("cell {:?} has label {}", row.cell, row.label))?;
+                let label = u16::try_from(row.label).map_err(|_| {
+                    format!(
+                        "cell {:?}: label {} is outside 0..2^16",
+                        row.cell, row.label
+                    )
+                })?;
                 let count = clamp(row.n);
                 known.push(LabelCount { label, count });
             }
@@ -216,9 +276,11 @@ impl MapOfTiles {
             }
         }
         match labels.next() {
-            Some((_, row)) => {
-                Err(format!("label {} is of no voxel: {:?}", row.label, row.cell).into())
-            }
+            Some((_, row)) => Err(format!(
+                "label {} at cell {:?}, which has no voxel",
+                row.label, row.cell
+            )
+            .into()),
             None => Ok(self.map),
         }
     }
@@ -232,7 +294,7 @@ struct Columns<'a> {
 impl<'a> Columns<'a> {
     fn get(&self, name: &str) -> Result<&'a Int64Array> {
         let column = self.batch.column_by_name(name);
-        let column = column.ok_or_else(|| format!("there is no column {name:?}"))?;
+        let column = column.ok_or_else(|| format!("column {name:?} is missing"))?;
         let integers = column.as_primitive_opt::<Int64Type>();
         let wrong = || format!("column {name:?} is of {}, not Int64", column.data_type());
         Ok(integers.ok_or_else(wrong)?)
@@ -254,7 +316,7 @@ fn cell(array: [&Int64Array; 4], row: usize) -> Result<(Tile, [i64; 3])> {
 }
 
 /// The rows of a batch of `voxels`, with their tiles.
-pub fn voxels_of(batch: &RecordBatch, mut take: impl FnMut(Tile, VoxelRow) -> Result) -> Result {
+pub fn voxels_of(batch: &RecordBatch, take: &mut dyn FnMut(Tile, VoxelRow) -> Result) -> Result {
     let columns = Columns { batch };
     let cells = [
         columns.get("tile")?,
@@ -274,11 +336,13 @@ pub fn voxels_of(batch: &RecordBatch, mut take: impl FnMut(Tile, VoxelRow) -> Re
         let all = sums.map(|column| value(column, row));
         let sums = match all {
             [Some(count), Some(x), Some(y), Some(z)] => Some([count, x, y, z]),
-            _ => None,
+            [None, None, None, None] => None,
+            _ => return Err(format!("cell {cell:?} lacks its count or a sum").into()),
         };
         let stamps_ns = match stamps.map(|column| value(column, row)) {
             [Some(first), Some(last)] => Some([first, last]),
-            _ => None,
+            [None, None] => None,
+            _ => return Err(format!("cell {cell:?} lacks one of its stamps").into()),
         };
         take(
             tile,
@@ -293,7 +357,7 @@ pub fn voxels_of(batch: &RecordBatch, mut take: impl FnMut(Tile, VoxelRow) -> Re
 }
 
 /// The rows of a batch of `labels`, with their tiles.
-pub fn labels_of(batch: &RecordBatch, mut take: impl FnMut(Tile, LabelRow) -> Result) -> Result {
+pub fn labels_of(batch: &RecordBatch, take: &mut dyn FnMut(Tile, LabelRow) -> Result) -> Result {
     let columns = Columns { batch };
     let cells = [
         columns.get("tile")?,
@@ -308,6 +372,22 @@ pub fn labels_of(batch: &RecordBatch, mut take: impl FnMut(Tile, LabelRow) -> Re
             return Err(format!("row {row}: a label or its count is null").into());
         };
         take(tile, LabelRow { cell, label, n })?;
+    }
+    Ok(())
+}
+
+/// The number of input rows and the sum in column `points` of each row of a merge, with its tile.
+pub fn totals_of(
+    batch: &RecordBatch,
+    points: &str,
+    mut take: impl FnMut(Tile, i64, i64),
+) -> Result {
+    let columns = Columns { batch };
+    let (tile, rows) = (columns.get("tile")?, columns.get("merged_rows")?);
+    let points = columns.get(points)?;
+    for row in 0..batch.num_rows() {
+        let number = |column| value(column, row).unwrap_or(0);
+        take(number(tile), number(rows), number(points));
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Columns of the tables, and how Parquet keeps them.
+//! Columns of the tables and their encodings in Parquet.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ pub fn labels() -> SchemaRef {
     Arc::new(Schema::new(fields.to_vec()))
 }
 
-/// Differences of integers in packed bits, then zstd: what suits sorted cells.
+/// Encodings for sorted cells: packed differences of integers, then zstd.
 pub fn properties() -> WriterProperties {
     WriterProperties::builder()
         .set_dictionary_enabled(false)

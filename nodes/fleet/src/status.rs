@@ -5,16 +5,16 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::Result;
-use crate::files::at;
+use crate::files::{FileId, at};
 use crate::merge::jobs_of;
 use crate::merged::{MERGED_FILE, Merged};
 use crate::tables::Tables;
+use crate::{AnyError, Result};
 
 /// State of a folder of tables.
 #[derive(Clone, Default, PartialEq, Eq, Debug, Serialize)]
 pub struct Status {
-    /// Parts that are complete.
+    /// Complete parts.
     pub parts: usize,
     /// Rows of `voxels` in all parts.
     pub rows: u64,
@@ -22,15 +22,15 @@ pub struct Status {
     pub bytes: u64,
     /// Tiles with rows.
     pub tiles: usize,
-    /// Tiles of the merged map that were made from the parts of now.
+    /// Tiles of the merged map that are up to date.
     pub tiles_merged: usize,
-    /// Folders of parts that were begun and not finished.
+    /// Unfinished parts: entries of the temporary folder.
     pub unfinished: usize,
-    /// Files that are not as they were written.
+    /// Errors of damaged files.
     pub damaged: Vec<String>,
 }
 
-/// The state of now; with `verify` every file is read.
+/// Determines the state; `verify` reads every file.
 pub fn status(tables: &Tables, merged: &Path, verify: bool) -> Result<Status> {
     let parts = tables.parts()?;
     let jobs = jobs_of(&parts);
@@ -45,22 +45,13 @@ pub fn status(tables: &Tables, merged: &Path, verify: bool) -> Result<Status> {
             let labels = tile.labels.as_ref().map_or(0, |id| id.bytes);
             let bytes = tile.voxels.bytes.saturating_add(labels);
             status.bytes = status.bytes.saturating_add(bytes);
-            for (path, id) in tile.files(&part.folder) {
-                let sound = match verify {
-                    true => id.verify(&path),
-                    false => match fs::metadata(&path) {
-                        Ok(found) if found.len() == id.bytes => Ok(()),
-                        Ok(found) => {
-                            let (is, was) = (found.len(), id.bytes);
-                            Err(at(&path, format!("damaged: {is} bytes instead of {was}")))
-                        }
-                        Err(error) => Err(at(&path, error)),
-                    },
-                };
-                status
-                    .damaged
-                    .extend(sound.err().map(|error| error.to_string()));
-            }
+            let wrong = if verify {
+                tile.check(&part.folder, &part.info.map).err()
+            } else {
+                let files = tile.files(&part.folder);
+                files.iter().find_map(|(path, id)| size_error(path, id))
+            };
+            status.damaged.extend(wrong.map(|error| error.to_string()));
         }
     }
     let place = merged.join(MERGED_FILE);
@@ -79,4 +70,19 @@ pub fn status(tables: &Tables, merged: &Path, verify: bool) -> Result<Status> {
             .count();
     }
     Ok(status)
+}
+
+/// The error of a file whose size differs from its manifest.
+fn size_error(path: &Path, id: &FileId) -> Option<AnyError> {
+    match fs::metadata(path) {
+        Ok(found) if found.len() == id.bytes => None,
+        Ok(found) => {
+            let (is, was) = (found.len(), id.bytes);
+            Some(at(
+                path,
+                format!("damaged: {is} bytes, its manifest has {was}"),
+            ))
+        }
+        Err(error) => Some(at(path, error)),
+    }
 }

@@ -1,4 +1,4 @@
-//! A folder of tables: parts that are complete, each named by what it was made from.
+//! Folder of tables: complete parts, each named by the digest of its source.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,11 +8,13 @@ use std::path::{Path, PathBuf};
 use lattice_core::voxels::file::{MapColumns, MapContents, max_voxels_of};
 
 use crate::files::{at, digest_of, write_manifest};
-use crate::part::{MapInfo, PartInfo, Source, VERSION, write_tile};
+use crate::part::{MapInfo, PartInfo, Source, VERSION};
 use crate::rows::{self, MapOfTiles};
+use crate::stop::Scratch;
+use crate::tile_files::{TileInfo, write_tile};
 use crate::{Result, files};
 
-/// Name of the file that says what a part holds; it is written last.
+/// Name of the manifest of a part; it is written last.
 pub const PART_FILE: &str = "part.json";
 
 /// A folder of tables.
@@ -21,28 +23,28 @@ pub struct Tables {
     folder: PathBuf,
 }
 
-/// A part that is complete.
+/// A complete part.
 #[derive(Clone, Debug)]
 pub struct Part {
-    /// Its name, the digest of what it was made from.
+    /// Name: the digest of its source.
     pub name: String,
-    /// Its folder.
+    /// Folder.
     pub folder: PathBuf,
-    /// Its contents and source.
+    /// Contents and source.
     pub info: PartInfo,
 }
 
-/// A part that was asked for.
+/// Result of adding a part.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Added {
-    /// Its name.
+    /// Name of the part.
     pub name: String,
-    /// False if it was there already.
+    /// False if the folder had it already.
     pub new: bool,
 }
 
 impl Source {
-    /// Name of the part that is made from this: a digest in 32 hexadecimal digits.
+    /// Name of the part with this source: a digest in 32 hexadecimal digits.
     pub fn part_name(&self) -> String {
         let slice = format!(
             "{:?} {:?}",
@@ -59,7 +61,7 @@ impl Source {
 }
 
 impl Tables {
-    /// The tables in a folder, which is made if it is not there.
+    /// The tables in a folder, which is created if needed.
     pub fn open_or_create(folder: &Path) -> Result<Tables> {
         let tables = Tables {
             folder: folder.to_owned(),
@@ -93,7 +95,7 @@ impl Tables {
         self.folder.join("parts")
     }
 
-    /// Folder of what is being written.
+    /// Folder of files being written.
     pub fn scratch_folder(&self) -> PathBuf {
         self.folder.join("tmp")
     }
@@ -103,7 +105,7 @@ impl Tables {
         self.parts_folder().join(name).join(PART_FILE).is_file()
     }
 
-    /// Adds a map as a part, written beside and renamed whole; a part that is there already stays.
+    /// Adds a map as a part, which is written in a temporary folder and renamed. An existing part stays.
     pub fn add(&self, map: &MapColumns, source: Source, origin: Option<[f64; 3]>) -> Result<Added> {
         let name = source.part_name();
         let added = |new| Added {
@@ -115,10 +117,8 @@ impl Tables {
         }
         check_sums(map)?;
         let scratch = self.scratch_folder();
-        let folder = tempfile::Builder::new()
-            .prefix(&format!("{name}-"))
-            .tempdir_in(&scratch)
-            .map_err(|error| at(&scratch, error))?;
+        let folder = Scratch::create(&scratch, &format!("{name}-"));
+        let folder = folder.map_err(|error| at(&scratch, error))?;
         let tiles = rows::of_map(map)?;
         let write =
             |(tile, rows): &(_, _)| write_tile(folder.path(), *tile, rows, map.labels.is_some());
@@ -132,18 +132,16 @@ impl Tables {
         write_manifest(&folder.path().join(PART_FILE), &info)?;
         open_to_all(folder.path())?;
         let place = self.parts_folder().join(&name);
-        let from = folder.keep();
-        match fs::rename(&from, &place) {
+        match folder.persist(&place) {
             Ok(()) => {
-                // Not every file system can bring a name to the disk.
+                // Not every file system can sync a folder.
                 let _ = fs::File::open(self.parts_folder()).and_then(|folder| folder.sync_all());
                 Ok(added(true))
             }
             Err(error) => {
-                let _ = fs::remove_dir_all(&from);
                 let there = [ErrorKind::DirectoryNotEmpty, ErrorKind::AlreadyExists];
                 match there.contains(&error.kind()) && self.has(&name) {
-                    // Another task of the same was faster.
+                    // Another task has added the same part.
                     true => Ok(added(false)),
                     false => Err(at(&place, error)),
                 }
@@ -151,7 +149,7 @@ impl Tables {
         }
     }
 
-    /// The parts that are complete, by name; what is no part, or of another version, is an error.
+    /// The complete parts by name. Other folders, and parts of another version, are errors.
     pub fn parts(&self) -> Result<Vec<Part>> {
         let folder = self.parts_folder();
         let mut parts = Vec::new();
@@ -165,10 +163,7 @@ impl Tables {
             let info = PartInfo::read(&path.join(PART_FILE))?;
             let expected = info.source.part_name();
             if expected != name {
-                return Err(at(
-                    &path,
-                    format!("what it was made from names it {expected}"),
-                ));
+                return Err(at(&path, format!("its source names it {expected}")));
             }
             parts.push(Part {
                 name,
@@ -181,7 +176,7 @@ impl Tables {
     }
 }
 
-/// Refuses sums that no points of the cell have, so that no engine can wrap around.
+/// Refuses sums that the points of the cell cannot reach, so that no engine can wrap around.
 fn check_sums(map: &MapColumns) -> Result {
     let reach = u128::from(MapColumns::offset_reach(&map.lattice));
     for (key, voxel) in map.keys.iter().zip(map.voxels.iter().flatten()) {
@@ -192,7 +187,7 @@ fn check_sums(map: &MapColumns) -> Result {
             .any(|sum| u128::from(sum.unsigned_abs()) > bound)
         {
             return Err(format!(
-                "cell {:?}: offset sums {:?} of {} points or more are beyond their bound of {bound}",
+                "cell {:?}: offset sums {:?} of {} points exceed the bound of {bound} units",
                 key.unpack(),
                 voxel.sum,
                 voxel.count
@@ -203,23 +198,19 @@ fn check_sums(map: &MapColumns) -> Result {
     Ok(())
 }
 
-/// The rights of any new folder, not those of a temporary one.
+/// Sets the permissions of a new folder, which differ from those of a temporary one.
 fn open_to_all(folder: &Path) -> Result {
     use std::os::unix::fs::PermissionsExt;
     fs::set_permissions(folder, fs::Permissions::from_mode(0o755))
         .map_err(|error| at(folder, error))
 }
 
-/// The map of some tiles, each read and verified.
-pub fn read_map(
-    folder: &Path,
-    map: &MapInfo,
-    tiles: &[crate::part::TileInfo],
-) -> Result<MapContents> {
+/// The map of some tiles, each verified.
+pub fn read_map(folder: &Path, map: &MapInfo, tiles: &[TileInfo]) -> Result<MapContents> {
     let columns = map.columns().map_err(|error| at(folder, error))?;
     let mut rows = MapOfTiles::new(columns);
     for tile in tiles {
-        rows.add(&tile.read(folder)?)
+        rows.add(&tile.read(folder, map)?)
             .map_err(|error| at(folder, error))?;
     }
     let columns = rows.finish().map_err(|error| at(folder, error))?;
@@ -252,7 +243,7 @@ pub fn digest_of_log(bag: &Path) -> Result<String> {
     Ok(digest_of(texts.iter().map(String::as_str)))
 }
 
-/// Reads a map file, whose size bounds its voxels.
+/// Reads a map file, whose size bounds the number of voxels.
 pub fn read_map_file(path: &Path) -> Result<MapContents> {
     let file = fs::File::open(path).map_err(|error| at(path, error))?;
     let bytes = file.metadata().map_err(|error| at(path, error))?.len();

@@ -1,14 +1,14 @@
-//! Tiles: cubes of 256 x 256 x 256 lattice indices, by which tables are partitioned.
+//! Tiles: cubes of 256 x 256 x 256 lattice indices that partition the tables.
 
 use lattice_core::lattice::MortonKey;
 
 /// Log2 of the lattice indices along the side of a tile.
 pub const TILE_LOG2: u32 = 8;
 
-/// Number of a tile: the Morton interleave of its place, as of a [`MortonKey`] with the lowest bits cut off.
+/// Number of a tile: the Morton interleave of its position, a [`MortonKey`] without the lowest bits.
 pub type Tile = i64;
 
-/// Tile of a cell by its absolute index; none beyond 2^28 cells from the origin.
+/// Tile of a cell by its absolute index; `None` for cells more than 2^28 from the origin.
 pub fn tile_of(cell: [i64; 3]) -> Option<Tile> {
     let place = cell.map(|w| i32::try_from(w >> TILE_LOG2).ok());
     let [Some(x), Some(y), Some(z)] = place else {

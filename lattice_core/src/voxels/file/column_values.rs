@@ -1,11 +1,11 @@
-//! The further columns of a list as bytes: stamps and labels.
+//! Optional columns of a list as bytes: stamps and labels.
 
 use super::read::ColumnError;
 use crate::voxels::codec::{Varints, push_varint, unzigzag, zigzag};
 use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{LabelCount, Stamps};
 
-/// First and last stamp, each as difference to the voxel before.
+/// First and last stamp, each as the difference to the previous voxel.
 pub(super) fn encode_stamps(columns: &Columns) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(columns.stamps.len().saturating_mul(8));
     let mut before = [0_i64; 2];
@@ -19,7 +19,7 @@ pub(super) fn encode_stamps(columns: &Columns) -> Vec<u8> {
     bytes
 }
 
-/// The inverse of [`encode_stamps`].
+/// Inverse of [`encode_stamps`].
 pub(super) fn decode_stamps(bytes: &[u8], voxels: usize) -> Result<Vec<Stamps>, ColumnError> {
     let mut values = Varints::new(bytes);
     let mut column = Vec::with_capacity(voxels);
@@ -39,7 +39,7 @@ pub(super) fn decode_stamps(bytes: &[u8], voxels: usize) -> Result<Vec<Stamps>, 
     Ok(column)
 }
 
-/// For each voxel the number of labels, and as often a label and its count.
+/// For each voxel the number of labels, then each label and its count.
 pub(super) fn encode_labels(columns: &Columns) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(columns.labels.len().saturating_mul(4));
     for labels in &columns.labels {
@@ -52,7 +52,7 @@ pub(super) fn encode_labels(columns: &Columns) -> Vec<u8> {
     bytes
 }
 
-/// The inverse of [`encode_labels`].
+/// Inverse of [`encode_labels`].
 pub(super) fn decode_labels(
     bytes: &[u8],
     voxels: usize,
@@ -61,7 +61,7 @@ pub(super) fn decode_labels(
     let mut column = Vec::with_capacity(voxels);
     for _ in 0..voxels {
         let len = expect(&mut values)?;
-        // Not reserved before they have come.
+        // Memory is not reserved before the values arrive.
         let mut labels: Vec<LabelCount> = Vec::new();
         for _ in 0..len {
             let (label, count) = (expect(&mut values)?, expect(&mut values)?);
@@ -80,15 +80,15 @@ pub(super) fn decode_labels(
     Ok(column)
 }
 
-/// The next value, which must be there.
+/// Next value; fails at the end.
 pub(super) fn expect(values: &mut Varints) -> Result<u64, ColumnError> {
     let value = values.next_value()?;
-    value.ok_or_else(|| values.error("it has too few values".into()))
+    value.ok_or_else(|| values.error("there are too few values".into()))
 }
 
 pub(super) fn expect_end(values: &mut Varints) -> Result<(), ColumnError> {
     match values.next_value()? {
-        Some(_) => Err(values.error("it has too many values".into())),
+        Some(_) => Err(values.error("there are too many values".into())),
         None => Ok(()),
     }
 }

@@ -1,4 +1,4 @@
-//! A map as plain columns, for tables and other languages.
+//! Map as plain columns, for tables and other languages.
 
 use super::MapContents;
 use super::contents::no_columns;
@@ -6,26 +6,26 @@ use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::store::fixed_point::reach;
 use crate::voxels::{DistortionSums, LabelCount, Stamps, Voxel};
 
-/// Columns of a map, a row for each voxel; nothing is checked before they become [`MapContents`].
+/// Columns of a map, one row per voxel; validated when they become [`MapContents`].
 #[derive(Clone, PartialEq, Debug)]
 pub struct MapColumns {
     /// The lattice.
     pub lattice: Lattice,
     /// Index of the datum in the lattice of the map frame.
     pub datum_index: [i64; 3],
-    /// The occupied cells, ascending.
+    /// Occupied cells, ascending.
     pub keys: Vec<MortonKey>,
-    /// Counts and offset sums; none in a map of occupied cells alone.
+    /// Counts and offset sums; `None` in a map of occupied cells only.
     pub voxels: Option<Vec<Voxel>>,
     /// Stamps of the first and the last point, if kept.
     pub stamps: Option<Vec<Stamps>>,
-    /// Labels with their points, ascending, if kept.
+    /// Labels with their counts, ascending, if kept.
     pub labels: Option<Vec<Vec<LabelCount>>>,
     /// Statistics of all points.
     pub statistics: DistortionSums,
 }
 
-/// Columns that no map has.
+/// Invalid columns.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct ColumnsError(String);
@@ -72,8 +72,10 @@ impl TryFrom<MapColumns> for MapContents {
 }
 
 impl MapColumns {
-    /// Largest offset of a point from the centre of its cell along an axis, in
-    /// [`OFFSET_UNIT_M`](crate::voxels::OFFSET_UNIT_M): `count` points sum to at most `count` times that.
+    /// Maximum offset of a point from the centre of its cell along an axis, in
+    /// [`OFFSET_UNIT_M`](crate::voxels::OFFSET_UNIT_M).
+    ///
+    /// `count` points sum to at most `count` times that.
     pub fn offset_reach(lattice: &Lattice) -> u64 {
         reach(lattice)
     }
@@ -95,7 +97,7 @@ impl MapColumns {
         let pairs = self.keys.iter().zip(self.keys.iter().skip(1));
         if let Some((key, next)) = pairs.clone().find(|(key, next)| key >= next) {
             let (key, next) = (key.raw(), next.raw());
-            return Err(format!("key {next} follows {key}: keys ascend"));
+            return Err(format!("key {next} follows {key}: keys must ascend"));
         }
         let reach = reach(&self.lattice);
         for (key, voxel) in self.keys.iter().zip(self.voxels.iter().flatten()) {
@@ -161,7 +163,7 @@ mod tests {
             ("20 keys and 19 rows of counts", |c| {
                 c.voxels.as_mut().unwrap().truncate(19);
             }),
-            ("keys ascend", |c| c.keys.swap(0, 1)),
+            ("keys must ascend", |c| c.keys.swap(0, 1)),
             ("a voxel without points", |c| {
                 c.voxels.as_mut().unwrap()[3].count = 0;
             }),

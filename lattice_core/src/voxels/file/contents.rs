@@ -1,4 +1,4 @@
-//! Contents of a map file, in the order of the keys.
+//! Contents of a map file, in key order.
 
 use nalgebra::Vector3;
 
@@ -7,9 +7,9 @@ use crate::voxels::distortion::DistortionSums;
 use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{Distortion, OccupancyList, Payload, Voxel, VoxelList, VoxelStore};
 
-/// A map as sorted columns: what a file holds, and what set operations on files work with.
+/// Map as sorted columns, for files and set operations.
 ///
-/// Keys ascend strictly; voxels and further columns, where there are any, have a row for each key.
+/// Keys ascend strictly; voxels and optional columns have one row per key, if present.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MapContents {
     pub(super) lattice: Lattice,
@@ -47,15 +47,15 @@ impl MapContents {
         }
     }
 
-    /// The map as a list of at most `max_voxels`; the voxels beyond are left out.
+    /// Converts to a list of at most `max_voxels`; further voxels are dropped.
     ///
-    /// A map without payload becomes one of a point at each centre, with statistics to match.
+    /// A map without payload becomes one with a point at each centre and matching statistics.
     pub fn into_list(self, max_voxels: usize) -> VoxelList {
         let payload = self.payload();
         self.into_list_with(payload, max_voxels)
     }
 
-    /// [`MapContents::into_list`] with other further columns, empty where the map has none.
+    /// [`MapContents::into_list`] with other optional columns, empty where the map has none.
     pub fn into_list_with(self, payload: Payload, max_voxels: usize) -> VoxelList {
         let list = VoxelList::at_datum(self.lattice, self.datum_index, max_voxels);
         let mut list = list.with_payload(payload);
@@ -75,7 +75,7 @@ impl MapContents {
         list
     }
 
-    /// The occupied cells as a list, so far as they fit into `max_bytes`.
+    /// Converts to an occupancy list of the cells that fit into `max_bytes`.
     pub fn into_occupancy(self, max_bytes: usize) -> OccupancyList {
         OccupancyList::from_keys(self.lattice, self.datum_index, self.keys, max_bytes)
     }
@@ -90,27 +90,27 @@ impl MapContents {
         self.datum_index
     }
 
-    /// The lattice point that keys count from, map frame, metres.
+    /// Datum: lattice point that keys count from, map frame, metres.
     pub fn datum_m(&self) -> Vector3<f64> {
         self.lattice.center_wide(self.datum_index)
     }
 
-    /// The occupied cells in ascending (Morton) order.
+    /// Occupied cells in ascending (Morton) order.
     pub fn keys(&self) -> &[MortonKey] {
         &self.keys
     }
 
-    /// The occupied cells, without the rest.
+    /// Takes the occupied cells.
     pub fn into_keys(self) -> Vec<MortonKey> {
         self.keys
     }
 
-    /// The payload, one for each key, if there is any.
+    /// Payload per key, if present.
     pub fn voxels(&self) -> Option<&[Voxel]> {
         self.voxels.as_deref()
     }
 
-    /// The further columns that are there.
+    /// Optional columns that are present.
     pub fn payload(&self) -> Payload {
         self.columns.payload()
     }
@@ -125,7 +125,7 @@ impl MapContents {
         self.datum_m() + self.lattice.center(key.unpack())
     }
 
-    /// Says what is wrong with the datum.
+    /// Validates the datum.
     pub(super) fn check_datum(&self) -> Result<(), String> {
         match self.lattice.quantize_wide(&self.datum_m()) {
             Some(_) => Ok(()),
@@ -136,7 +136,7 @@ impl MapContents {
         }
     }
 
-    /// Says what is wrong with the statistics; keys and voxels are checked as they are read.
+    /// Validates the statistics; keys and voxels are validated when read.
     pub(super) fn check(&self) -> Result<(), String> {
         if let Some(reason) = self.sums.contradiction(&self.lattice) {
             return Err(reason);

@@ -1,4 +1,4 @@
-//! The fixed head of a map file, of a section, and its end.
+//! Fixed heads of a map file and of a section, and the end of the file.
 
 use super::{Figure, FileError, LatticeFigures};
 use crate::lattice::Lattice;
@@ -8,9 +8,9 @@ pub(super) const MAGIC: &[u8; 8] = b"LATTICE2";
 pub(super) const OLD_MAGIC: &[u8; 8] = b"LATTICE1";
 pub(super) const SECTION_TAG: &[u8; 4] = b"SECT";
 pub(super) const END_TAG: &[u8; 4] = b"LEND";
-/// Bytes of the head, its checksum included.
+/// Size of the file head with its checksum, bytes.
 pub(super) const HEAD_BYTES: usize = 224;
-/// Bytes of the head of a section, its checksum included.
+/// Size of a section head with its checksum, bytes.
 pub(super) const SECTION_HEAD_BYTES: usize = 48;
 
 const VOLUME_AT: u64 = 24;
@@ -49,7 +49,7 @@ impl Head {
         bytes
     }
 
-    /// Reads what follows the magic, without the checksum; the datum is not checked.
+    /// Reads the fields after the magic, without the checksum; the datum is not validated.
     pub(super) fn from_bytes(bytes: &[u8]) -> Result<Head, FileError> {
         let mut fields = Fields {
             bytes,
@@ -92,15 +92,15 @@ impl Head {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(super) enum Encoding {
-    /// LEB128 of the difference to the value before, the first absolute.
+    /// LEB128 of the difference to the previous value, the first absolute.
     Steps = 0,
     /// LEB128.
     Unsigned = 1,
     /// LEB128 of the zigzag form: 0, -1, 1, -2, ...
     Signed = 2,
-    /// As `Signed`, of the difference to the same value of the voxel before.
+    /// As `Signed`, of the difference to the same value of the previous voxel.
     SignedSteps = 3,
-    /// As `Unsigned`; a row begins with how many entries it has.
+    /// As `Unsigned`; a row starts with its number of entries.
     Rows = 4,
 }
 
@@ -111,14 +111,14 @@ pub(super) enum Codec {
     Zstd = 1,
 }
 
-/// A column: its name and what its values are.
+/// Column: its name and the encoding of its values.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Column {
     pub(super) name: &'static str,
     pub(super) encoding: Encoding,
-    /// Values for each voxel.
+    /// Values per voxel.
     pub(super) components: u8,
-    /// Most bytes that a value takes.
+    /// Maximum bytes per value.
     pub(super) longest: u64,
 }
 
@@ -137,13 +137,13 @@ pub(super) const KEYS: Column = Column::new("keys", Encoding::Steps, 1, 9);
 pub(super) const COUNT: Column = Column::new("count", Encoding::Unsigned, 1, 5);
 pub(super) const OFFSET_SUM: Column = Column::new("offset_sum", Encoding::Signed, 3, 10);
 pub(super) const STAMPS: Column = Column::new("stamps", Encoding::SignedSteps, 2, 10);
-/// Longest: the number of labels, and each label with its count.
+/// Maximum: the number of labels, and each label with its count.
 pub(super) const LABELS: Column = Column::new("labels", Encoding::Rows, 1, 3 + 65_536 * 8);
 
-/// The columns in their order: the first, two that come together, and two of which each may lack.
+/// Columns in order: the first is required, the next two come together, the last two are optional.
 pub(super) const COLUMNS: [Column; 5] = [KEYS, COUNT, OFFSET_SUM, STAMPS, LABELS];
 
-/// The head of a section; columns of later versions have other names, encodings and codecs.
+/// Head of a section; columns of later versions have other names, encodings and codecs.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct SectionHead {
     pub(super) name: String,
@@ -168,7 +168,7 @@ impl SectionHead {
         bytes
     }
 
-    /// Reads what follows the tag, without the checksum; `start` is the position of the tag.
+    /// Reads the fields after the tag, without the checksum; `start` is the position of the tag.
     pub(super) fn from_bytes(bytes: &[u8], start: u64) -> Result<SectionHead, FileError> {
         let at = start + SECTION_TAG.len() as u64;
         let mut fields = Fields {
@@ -178,7 +178,10 @@ impl SectionHead {
         let name = name_of(&fields.array::<16>()).map_err(|reason| corrupt(at, reason))?;
         let [encoding, components, codec, reserved] = fields.array();
         if reserved != 0 {
-            return Err(corrupt(fields.position - 1, "a byte should be zero".into()));
+            return Err(corrupt(
+                fields.position - 1,
+                "a reserved byte is not zero".into(),
+            ));
         }
         Ok(SectionHead {
             name,
@@ -196,7 +199,7 @@ pub(super) fn corrupt(position: u64, reason: String) -> FileError {
     FileError::Corrupt { position, reason }
 }
 
-/// A name filled up with zero bytes.
+/// Name padded with zero bytes.
 fn name16(name: &str) -> [u8; 16] {
     let mut bytes = [0; 16];
     bytes
@@ -214,12 +217,15 @@ fn name_of(bytes: &[u8; 16]) -> Result<String, String> {
         .collect();
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
     if name.is_empty() || !name.chars().all(plain) || name16(&name) != *bytes {
-        return Err(format!("{:?} is no name", bytes.escape_ascii().to_string()));
+        return Err(format!(
+            "{:?} is not a section name",
+            bytes.escape_ascii().to_string()
+        ));
     }
     Ok(name)
 }
 
-/// Takes fields off bytes of known length; beyond the end there are zeros.
+/// Reader of fields of known size; zeros beyond the end.
 struct Fields<'a> {
     bytes: &'a [u8],
     position: u64,

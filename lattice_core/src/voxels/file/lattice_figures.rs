@@ -1,13 +1,13 @@
-//! The figures that a file or a table keeps of a lattice.
+//! Parameters of a lattice in a file or a table.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
 
 use crate::lattice::{Lattice, LatticeKind};
 
-/// Largest deviation of the squared length of a quaternion from 1.
+/// Maximum deviation of the squared length of a quaternion from 1.
 const UNIT_SLACK: f64 = 1e-6;
 
-/// A lattice in numbers, from which exactly that lattice is made again.
+/// Lattice as numbers that reproduce it exactly.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LatticeFigures {
     /// Kind of the lattice.
@@ -20,16 +20,16 @@ pub struct LatticeFigures {
     pub generator_m: [f64; 9],
 }
 
-/// A figure that contradicts the others.
+/// Inconsistent parameter.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{reason}")]
 pub struct FiguresError {
-    /// The figure.
+    /// The parameter.
     pub figure: Figure,
     reason: String,
 }
 
-/// A figure of a lattice.
+/// Parameter of a lattice.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[expect(missing_docs, reason = "named as the fields")]
 pub enum Figure {
@@ -65,7 +65,7 @@ impl From<&Lattice> for LatticeFigures {
 }
 
 impl LatticeFigures {
-    /// The kind that a name in a file stands for, `custom` too.
+    /// Kind of a name in a file, `custom` included.
     pub fn kind_of(name: &str) -> Result<LatticeKind, String> {
         if name == LatticeKind::Custom.name() {
             return Ok(LatticeKind::Custom);
@@ -73,7 +73,7 @@ impl LatticeFigures {
         name.parse().map_err(|error| format!("{error}"))
     }
 
-    /// The lattice of these figures, if they are those that it has, to the bit.
+    /// Lattice of these parameters, if it reproduces them to the bit.
     pub fn lattice(&self) -> Result<Lattice, FiguresError> {
         let (volume_m3, generator) = (self.cell_volume_m3, &self.generator_m);
         let lattice = match self.kind {
@@ -98,7 +98,7 @@ impl LatticeFigures {
         if bits(&self.orientation) != bits(&expected.orientation) {
             let (turned, expected) = (self.orientation, expected.orientation);
             return Err(Figure::Orientation.error(format!(
-                "orientation {turned:?} should be written as {expected:?}"
+                "orientation {turned:?} differs from its canonical form {expected:?}"
             )));
         }
         if bits(generator) != bits(&expected.generator_m) {
@@ -110,14 +110,14 @@ impl LatticeFigures {
     }
 }
 
-/// Says what is wrong with an orientation.
+/// Validates an orientation.
 pub(super) fn orientation_error(map_from_lattice: &UnitQuaternion<f64>) -> Option<String> {
     let square = map_from_lattice.coords.norm_squared();
-    // Not a number is refused too.
+    // NaN fails too.
     let unit = (square - 1.0).abs() <= UNIT_SLACK;
     (!unit).then(|| {
         format!(
-            "the orientation {:?} is no unit quaternion",
+            "orientation {:?} is not a unit quaternion",
             map_from_lattice.coords
         )
     })

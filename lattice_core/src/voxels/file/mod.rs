@@ -1,6 +1,6 @@
-//! Maps as files: lattice, datum, sorted keys and, if wanted, the payload of each voxel.
+//! Map files: lattice, datum, sorted keys and, optionally, the payload of each voxel.
 //!
-//! `docs/map_file.md` describes the format and has a reader in Python.
+//! `docs/map_file.md` specifies the format and has a reader in Python.
 
 mod column_values;
 mod columns;
@@ -26,17 +26,17 @@ pub use error::FileError;
 pub use lattice_figures::{Figure, FiguresError, LatticeFigures};
 pub use operations::OperationError;
 
-/// A section may not unpack to more than this many times its stored bytes.
+/// Maximum ratio of the unpacked to the stored bytes of a section.
 ///
-/// Bounds what a small file can make a reader allocate; maps of surfaces stay far below.
+/// It bounds the memory that a small file can allocate; maps of surfaces stay far below.
 pub const MAX_EXPANSION: u64 = 64;
 
-/// Most voxels that a file of this many bytes can hold.
+/// Maximum number of voxels in a file of a given size.
 pub fn max_voxels_of(file_bytes: u64) -> usize {
     usize::try_from(file_bytes.saturating_mul(MAX_EXPANSION)).unwrap_or(usize::MAX)
 }
 
-/// Log2 of the largest zstd window that a reader takes: that of level 19.
+/// Log2 of the largest zstd window of a reader: that of level 19.
 const MAX_WINDOW_LOG: u32 = 23;
 
 /// Options for writing a map.
@@ -53,7 +53,7 @@ pub fn write_map(list: &VoxelList, writer: impl Write) -> Result<(), FileError> 
     MapContents::from_list(list).write(writer, &WriteOptions::default())
 }
 
-/// True for what begins as a map file does, of whatever version.
+/// Tests whether data start as a map file of any version.
 pub fn is_map(mut reader: impl Read) -> bool {
     let mut magic = [0; 8];
     reader.read_exact(&mut magic).is_ok() && [head::MAGIC, head::OLD_MAGIC].contains(&&magic)

@@ -10,14 +10,16 @@ use crate::voxels::distortion::scaled;
 use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{Voxel, set_ops};
 
-/// Two maps that do not go together. The receiving map is as before.
+/// Incompatible maps; the receiving map is unchanged.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum OperationError {
-    /// The cells are different.
-    #[error("one map is of {ours}, the other of {theirs}: only maps of the same cells go together")]
+    /// Different cells.
+    #[error(
+        "one map is of {ours}, the other of {theirs}: only maps of the same lattice can be combined"
+    )]
     Lattice { ours: String, theirs: String },
-    /// A cell of the other map cannot be counted from the datum of the receiving one.
+    /// Cell of the other map out of the key range of the receiving one.
     #[error(
         "cell {cell:?} of the other map is more than 2^20 cells from datum index {datum_index:?}: give both maps datums near each other"
     )]
@@ -25,19 +27,19 @@ pub enum OperationError {
         cell: [i64; 3],
         datum_index: [i64; 3],
     },
-    /// One map has counts and offsets, or a further column, that the other has not.
+    /// Payload or optional column in only one of the maps.
     #[error("only one of the maps has {0}: drop all but the cells with occupancy only")]
     Payload(&'static str),
 }
 
 impl MapContents {
-    /// Leaves out counts, offsets and further columns; keeps the statistics.
+    /// Drops counts, offsets and optional columns; keeps the statistics.
     pub fn drop_payload(&mut self) {
         self.voxels = None;
         self.columns = no_columns();
     }
 
-    /// The same cells, counted from another lattice point of the map frame.
+    /// Re-expresses the cells relative to another datum.
     pub fn with_datum(mut self, datum_index: [i64; 3]) -> Result<MapContents, OperationError> {
         if datum_index == self.datum_index {
             return Ok(self);
@@ -70,8 +72,8 @@ impl MapContents {
         Ok(self)
     }
 
-    /// Adds all voxels and statistics of `other`, exactly; order and grouping do not matter as long
-    /// as the first map gives the datum.
+    /// Adds all voxels and statistics of `other`, exactly; commutative and associative if the first map defines the
+    /// datum.
     pub fn merge(&mut self, other: MapContents) -> Result<(), OperationError> {
         self.expect_cells_of(&other)?;
         self.expect_columns_of(&other)?;
@@ -108,9 +110,10 @@ impl MapContents {
         Ok(())
     }
 
-    /// Keeps the cells that `keep` wants, called in ascending order with key and centre (map frame,
-    /// metres). The statistics count the points of these; their distances, which no cell keeps, are taken
-    /// in proportion.
+    /// Keeps the cells for which `keep` is true, called in ascending order with key and centre (map frame, metres).
+    ///
+    /// The statistics count the points of these. Their distances, which are not stored per cell, are scaled in
+    /// proportion.
     pub fn retain(&mut self, mut keep: impl FnMut(MortonKey, Vector3<f64>) -> bool) {
         let datum_m = self.datum_m();
         let kept: Vec<bool> = self
@@ -130,14 +133,14 @@ impl MapContents {
         if kept.contains(&false) {
             let points = match &self.voxels {
                 Some(voxels) => voxels.iter().map(|voxel| u64::from(voxel.count)).sum(),
-                // Cells that count nothing share the points alike.
+                // Cells without counts share the points equally.
                 None => scaled(self.sums.points.into(), self.keys.len() as u64, all) as u64,
             };
             self.sums = self.sums.of_part(points);
         }
     }
 
-    /// Fails unless both maps are of the same cells.
+    /// Fails unless both maps have the same cells.
     pub fn expect_cells_of(&self, other: &MapContents) -> Result<(), OperationError> {
         if self.lattice == other.lattice {
             return Ok(());

@@ -1,4 +1,4 @@
-//! Reading a map: its sections in order, each column checked value by value.
+//! Reading a map: sections in order, each column validated value by value.
 
 use std::io::{self, Read};
 
@@ -17,13 +17,13 @@ use crate::voxels::store::fixed_point::reach;
 impl MapContents {
     /// Reads a map of at most `max_voxels`.
     ///
-    /// Columns with unknown names are skipped; otherwise this refuses anything that no writer of
-    /// this format writes. Allocates in proportion to the bytes that have been read.
+    /// Columns with unknown names are skipped; anything else that no writer of this format writes is rejected.
+    /// Allocates in proportion to the bytes read.
     pub fn read(reader: impl Read, max_voxels: usize) -> Result<MapContents, FileError> {
         Self::read_columns(reader, max_voxels, COLUMNS.len())
     }
 
-    /// As [`MapContents::read`], but skips everything behind the keys.
+    /// As [`MapContents::read`], but skips everything after the keys.
     pub(super) fn read_keys(
         reader: impl Read,
         max_voxels: usize,
@@ -31,7 +31,7 @@ impl MapContents {
         Self::read_columns(reader, max_voxels, 1)
     }
 
-    /// Reads the first `wanted` of the columns that are known.
+    /// Reads the first `wanted` of the known columns.
     fn read_columns(
         reader: impl Read,
         max_voxels: usize,
@@ -69,7 +69,7 @@ impl MapContents {
             if !fits {
                 return Err(corrupt(
                     source.position() - SECTION_HEAD_BYTES as u64,
-                    format!("section {number} cannot be {:?} here", section.name),
+                    format!("section {number} is {:?}, out of order", section.name),
                 ));
             }
             known = place.map_or(known, |place| place + 1);
@@ -84,7 +84,7 @@ impl MapContents {
             let missing = if known == 0 { "keys" } else { "offset_sum" };
             return Err(corrupt(
                 source.position(),
-                format!("there is no section {missing:?}"),
+                format!("section {missing:?} is missing"),
             ));
         }
         contents.check().map_err(|reason| corrupt(160, reason))?;
@@ -134,7 +134,7 @@ impl MapContents {
     }
 }
 
-/// Error in the values of a column, with the byte behind it.
+/// Error in the values of a column, at the byte after it.
 pub(super) struct ColumnError {
     offset: usize,
     reason: String,
@@ -142,9 +142,11 @@ pub(super) struct ColumnError {
 
 impl From<CodecError> for ColumnError {
     fn from(error: CodecError) -> ColumnError {
-        // The bytes have the right CRC: what is wrong was written so.
+        // The CRC matches, so the error was written.
         let (offset, reason) = match error {
-            CodecError::Truncated { position } => (position, "it ends within a number".to_owned()),
+            CodecError::Truncated { position } => {
+                (position, "the values end within a number".to_owned())
+            }
             CodecError::Varint { position } => (
                 position,
                 "a number is not a shortest 64-bit varint".to_owned(),
@@ -153,14 +155,14 @@ impl From<CodecError> for ColumnError {
                 position,
                 format!("key {index} does not ascend or is not below 2^63"),
             ),
-            CodecError::TooMany { .. } => (0, "it has too many values".to_owned()),
+            CodecError::TooMany { .. } => (0, "there are too many values".to_owned()),
         };
         ColumnError { offset, reason }
     }
 }
 
 impl Varints<'_> {
-    /// An error at the place of the next value.
+    /// Error at the position of the next value.
     pub(super) fn error(&self, reason: String) -> ColumnError {
         ColumnError {
             offset: self.position(),
@@ -182,7 +184,7 @@ impl<R: Read> Source<R> {
         let wrong = |reason: String| corrupt(head_at, format!("section {}: {reason}", column.name));
         if (section.encoding, section.components) != (column.encoding as u8, column.components) {
             return Err(wrong(format!(
-                "encoding {} of {} components is not known",
+                "unknown encoding {} of {} components",
                 section.encoding, section.components
             )));
         }
@@ -190,7 +192,7 @@ impl<R: Read> Source<R> {
         let longest = values.saturating_mul(column.longest);
         if !(values..=longest).contains(&section.raw_bytes) {
             return Err(wrong(format!(
-                "{values} values do not take {} bytes",
+                "{} bytes do not fit {values} values",
                 section.raw_bytes
             )));
         }
@@ -200,7 +202,7 @@ impl<R: Read> Source<R> {
             codec if codec == Codec::Zstd as u8 => {
                 stored < raw && raw <= stored.saturating_mul(MAX_EXPANSION)
             }
-            codec => return Err(wrong(format!("codec {codec} is not known"))),
+            codec => return Err(wrong(format!("unknown codec {codec}"))),
         };
         if !plausible {
             return Err(wrong(format!(
@@ -253,7 +255,7 @@ fn decompress(stored: &[u8], raw_bytes: u64) -> Result<Vec<u8>, String> {
     let (raw, left) = unpack().map_err(|error| format!("zstd: {error}"))?;
     if raw.len() as u64 != raw_bytes || left > 0 {
         return Err(format!(
-            "it does not unpack to {raw_bytes} bytes and nothing else"
+            "the zstd frame does not unpack to exactly {raw_bytes} bytes"
         ));
     }
     Ok(raw)

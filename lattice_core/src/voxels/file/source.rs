@@ -1,4 +1,4 @@
-//! Bytes of a map file with their place and their checksums.
+//! Bytes of a map file with their position and checksums.
 
 use std::io::{self, Read};
 use std::ops::Range;
@@ -9,10 +9,10 @@ use super::head::{
     corrupt,
 };
 
-/// Bytes of a section that are read at once.
+/// Bytes of a section read at once.
 const PART_BYTES: u64 = 1 << 20;
 
-/// Hands out bytes and knows their place and checksum.
+/// Reader that tracks the position and the checksum.
 pub(super) struct Source<R> {
     reader: R,
     crc: crc32fast::Hasher,
@@ -32,7 +32,7 @@ impl<R: Read> Source<R> {
         self.position
     }
 
-    /// Fills as much of the buffer as there is.
+    /// Fills the buffer as far as data are available.
     fn fill(&mut self, buffer: &mut [u8], part: &str) -> Result<(), FileError> {
         let mut filled = 0;
         while let Some(rest) = buffer.get_mut(filled..).filter(|rest| !rest.is_empty()) {
@@ -59,7 +59,7 @@ impl<R: Read> Source<R> {
         Ok(())
     }
 
-    /// Bytes of which the last four are the checksum of those before; hands out those.
+    /// Reads bytes whose last four are the checksum of the others; returns these.
     fn summed<const N: usize>(&mut self, begin: &[u8], part: &str) -> Result<Vec<u8>, FileError> {
         let start = self.position - begin.len() as u64;
         let mut bytes = vec![0; N - begin.len() - 4];
@@ -98,26 +98,26 @@ impl<R: Read> Source<R> {
         let mut tag = [0; 4];
         self.fill(&mut tag, "head of a section")?;
         if tag != *SECTION_TAG {
-            return Err(corrupt(start, "a section should begin here".to_owned()));
+            return Err(corrupt(start, "expected the start of a section".to_owned()));
         }
         let bytes = self.summed::<SECTION_HEAD_BYTES>(&tag, "head of a section")?;
         SectionHead::from_bytes(&bytes, start)
     }
 
-    /// The stored bytes of a section, checked.
+    /// Stored bytes of a section, with a verified checksum.
     pub(super) fn stored(&mut self, section: &SectionHead) -> Result<Vec<u8>, FileError> {
-        // Grows as the bytes come, whatever the head promises.
+        // Grows with the data, whatever size the head declares.
         let mut bytes = Vec::new();
         self.each_part(section, |part| bytes.extend_from_slice(part))?;
         Ok(bytes)
     }
 
-    /// Passes over a section, in constant memory.
+    /// Skips a section, in constant memory.
     pub(super) fn skip(&mut self, section: &SectionHead) -> Result<(), FileError> {
         self.each_part(section, |_| {})
     }
 
-    /// Hands out the stored bytes of a section part by part; fails at the end if they are damaged.
+    /// Passes the stored bytes of a section in parts; fails at the end if they are damaged.
     fn each_part(
         &mut self,
         section: &SectionHead,
@@ -139,13 +139,13 @@ impl<R: Read> Source<R> {
         verify(start..self.position, &name, section.crc, crc.finalize())
     }
 
-    /// Reads and checks the end marker, its checksum and the end.
+    /// Reads and verifies the end marker, its checksum and the end.
     pub(super) fn finish(&mut self) -> Result<(), FileError> {
         let start = self.position;
         let mut tag = [0; 4];
         self.fill(&mut tag, "end marker")?;
         if tag != *END_TAG {
-            return Err(corrupt(start, "the end marker should be here".to_owned()));
+            return Err(corrupt(start, "expected the end marker".to_owned()));
         }
         self.crc.update(&tag);
         let end = self.position;

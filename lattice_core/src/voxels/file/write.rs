@@ -78,7 +78,7 @@ impl<W: Write> Sink<W> {
         self.write_summed(bytes)
     }
 
-    /// Writes bytes that the checksum has already.
+    /// Writes bytes already in the checksum.
     fn write_summed(&mut self, bytes: &[u8]) -> Result<(), FileError> {
         self.writer
             .write_all(bytes)
@@ -121,7 +121,7 @@ impl<W: Write> Sink<W> {
         self.write_summed(&stored)
     }
 
-    /// `None` if that makes the section no smaller, or so small that no reader would believe it.
+    /// Compresses a section; `None` if it gets no smaller, or smaller than readers accept.
     fn compress(&self, raw: &[u8], level: i32) -> Result<Option<Vec<u8>>, FileError> {
         let packed = zstd::bulk::compress(raw, level).map_err(|source| FileError::Io {
             position: self.position,

@@ -274,6 +274,8 @@ impl Replay {
         if let Some(origin) = report.origin {
             arguments.push("--origin".into());
             arguments.extend(origin.map(|value| value.to_string().into()));
+        } else {
+            arguments.push("--own-frame".into());
         }
         for file in std::fs::read_dir(folder.path())? {
             arguments.push(file?.path().into());

@@ -114,20 +114,22 @@ fn manifests_that_lie_are_refused_by_name() {
     let good = fs::read_to_string(&file).unwrap();
     type Lie = fn(&mut Value);
     let lies: [(&str, Lie); 9] = [
-        ("each comes once", |part| {
+        ("must be unique and ascend", |part| {
             let tile = part["tiles"][0].clone();
             part["tiles"].as_array_mut().unwrap().insert(0, tile);
         }),
-        ("each comes once", |part| {
+        ("must be unique and ascend", |part| {
             part["tiles"].as_array_mut().unwrap().reverse();
         }),
         ("its manifest promises", |part| {
             part["tiles"][0]["rows"] = json!(7)
         }),
-        ("no tile of", |part| {
+        ("a tile has 1..=", |part| {
             part["tiles"][0]["rows"] = json!(u64::MAX)
         }),
-        ("no tile of", |part| part["tiles"][0]["rows"] = json!(0)),
+        ("a tile has 1..=", |part| {
+            part["tiles"][0]["rows"] = json!(0)
+        }),
         ("its manifest promises", |part| {
             part["tiles"][0]["label_rows"] = json!(1)
         }),

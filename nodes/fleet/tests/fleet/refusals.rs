@@ -1,4 +1,4 @@
-//! Maps that do not go together are refused before any work, with the numbers.
+//! Maps that cannot be merged are refused before any work, with their values.
 
 use std::fs;
 
@@ -32,7 +32,7 @@ fn maps_of_other_cells_are_refused() {
         }
         let said = refused(["merge", text(&tables)]);
         assert!(
-            said.contains("do not go together") && said.contains(expected),
+            said.contains("cannot be merged") && said.contains(expected),
             "{said}"
         );
         assert!(!tables.join("merged").exists());
@@ -72,7 +72,7 @@ fn tampered_and_foreign_folders_are_refused_by_name() {
     let file = parts(&tables)[0].join("part.json");
     let good = fs::read_to_string(&file).unwrap();
     for (from, to, expected) in [
-        ("\"version\": 2", "\"version\": 7", "version 7"),
+        ("\"version\": 3", "\"version\": 7", "version 7"),
         (
             "0.05",
             "0.0500001",
@@ -92,7 +92,7 @@ fn tampered_and_foreign_folders_are_refused_by_name() {
     }
     fs::write(&file, r#"{"version": 1, "tiles": []}"#).unwrap();
     let said = refused(["merge", text(&tables)]);
-    assert!(said.contains("version 1 of the tables, not 2"), "{said}");
+    assert!(said.contains("version 1 of the tables, not 3"), "{said}");
     fs::write(&file, good).unwrap();
     run(["merge", text(&tables)]);
     let said = refused([

@@ -66,20 +66,25 @@ fn forged_sections_are_refused_where_they_are_wrong() {
     let named = vec![of(b"KEYS", plain, &FIRST_KEY)];
     let empty_cell = vec![keys(), count(0), sums()];
     for (voxels, sections, position, words) in [
-        (1, vec![], head, "no section \"keys\""),
-        (1, vec![count(1)], head, "cannot be \"count\""),
+        (1, vec![], head, "section \"keys\" is missing"),
+        (1, vec![count(1)], head, "is \"count\", out of order"),
         (1, vec![keys(), count(1)], data + 9 + 49, "offset_sum"),
-        (1, vec![keys(), keys()], data + 9, "cannot be \"keys\""),
+        (
+            1,
+            vec![keys(), keys()],
+            data + 9,
+            "is \"keys\", out of order",
+        ),
         (2, vec![keys()], data + 9, "1 keys instead of 2"),
-        (20, vec![keys()], head, "do not take 9 bytes"),
-        (u64::MAX, vec![keys()], head, "do not take 9 bytes"),
-        (0, vec![keys()], head, "do not take 9 bytes"),
+        (20, vec![keys()], head, "9 bytes do not fit"),
+        (u64::MAX, vec![keys()], head, "9 bytes do not fit"),
+        (0, vec![keys()], head, "9 bytes do not fit"),
         (1, empty_cell, data + 9 + 49 + 51, "without points"),
         (1, vec![keys(), count(2), sums()], 160, "statistics 1"),
         (1, keys_of([1, 1, 0, 0], &FIRST_KEY), head, "encoding"),
         (1, keys_of([0, 1, 2, 0], &FIRST_KEY), head, "codec 2"),
         (1, keys_of([0, 1, 0, 1], &FIRST_KEY), head + 23, "zero"),
-        (1, named, head + 4, "no name"),
+        (1, named, head + 4, "not a section name"),
         (2, keys_of(plain, &[1, 0]), data + 2, "ascend"),
         (2, keys_of(plain, &[1, 0x81, 0]), data + 2, "shortest"),
         (2, keys_of(plain, &[1, 0x81]), data + 2, "within a number"),
@@ -114,7 +119,7 @@ fn a_section_that_unpacks_to_too_much_is_refused() {
     let some = zstd::bulk::compress(&[1; 300], 3).unwrap();
     assert!(reason(301, &some).contains("does not unpack to"));
     assert!(reason(300, &some[..some.len() - 1]).contains("zstd"));
-    assert!(reason(300, &[&some[..], &[0]].concat()).contains("nothing else"));
+    assert!(reason(300, &[&some[..], &[0]].concat()).contains("exactly"));
     // The writer keeps to what readers take.
     let keys = (1..100_000).filter_map(MortonKey::from_raw);
     let lattice = map.lattice().clone();
@@ -156,8 +161,8 @@ fn a_lattice_that_no_writer_writes_is_refused_with_its_place() {
         (cubic, 32, 1.001, 32, "unit quaternion"),
         (cubic, 40, f64::INFINITY, 32, "unit quaternion"),
         (turned, 32, 0.0, 32, "unit quaternion"),
-        (cubic, 32, -1.0, 32, "should be"),
-        (cubic, 40, -0.0, 32, "should be"),
+        (cubic, 32, -1.0, 32, "canonical form"),
+        (cubic, 40, -0.0, 32, "canonical form"),
         (cubic, 24, f64::NAN, 24, "volume"),
         (cubic, 64, 0.25, 64, "generator"),
         (cubic, 72, -0.0, 64, "generator"),
@@ -220,12 +225,15 @@ fn forged_further_columns_are_refused_where_they_are_wrong() {
         (vec![labels(&[1, 0x80, 0x80, 4, 1])], "label 65536"),
         (vec![labels(&[2, 7, 1, 7, 1])], "ascend"),
         (vec![labels(&[0x80, 0x80, 0x80, 0x80, 0x10])], "too few"),
-        (vec![labels(&[0]), stamps(&[1, 2])], "cannot be \"stamps\""),
-        (vec![stamps(&[1])], "do not take 1"),
+        (
+            vec![labels(&[0]), stamps(&[1, 2])],
+            "is \"stamps\", out of order",
+        ),
+        (vec![stamps(&[1])], "1 bytes do not fit"),
         (vec![stamps(&[0x80, 1])], "too few"),
         (
             vec![stamps(&[1, 2]), stamps(&[1, 2])],
-            "cannot be \"stamps\"",
+            "is \"stamps\", out of order",
         ),
         (vec![of(b"stamps", [2, 2], &[1, 2])], "encoding"),
     ] {
@@ -235,7 +243,7 @@ fn forged_further_columns_are_refused_where_they_are_wrong() {
     let bare = [plain()[0].clone(), stamps(&[1, 2])];
     let error = read_map(&forged(&map, 1, &bare)[..], 1).unwrap_err();
     assert!(
-        error.to_string().contains("cannot be \"stamps\""),
+        error.to_string().contains("is \"stamps\", out of order"),
         "{error}"
     );
 }

@@ -14,9 +14,9 @@ use crate::{not_negative, positive, program_lattice, progress};
 /// Options of `lattice fleet align`.
 #[derive(Args)]
 pub struct Align {
-    /// Folder of tables with the logs to align, mapped as they are
+    /// Folder of tables with the logs to align, mapped without corrections
     tables: PathBuf,
-    /// Folder of the merged map that they are aligned with, such as site/merged; made without them
+    /// Folder of the reference, a merged map without these logs, such as site/merged
     #[arg(long, value_name = "DIR")]
     against: PathBuf,
     /// File for the corrections, JSON; `lattice fleet map --corrections` takes it
@@ -25,13 +25,13 @@ pub struct Align {
     /// Sensor of the logs, as of `lattice calibrate`: lidar, headset or depth_camera
     #[arg(long, default_value = "lidar")]
     profile: String,
-    /// A log that would move farther is left out, m
+    /// Largest move, m; a log that would move farther is left out. It bounds the search too
     #[arg(long, default_value_t = 5.0, value_name = "M", value_parser = positive)]
     max_move: f64,
-    /// A log that would turn more is left out, degrees
+    /// Largest rotation, degrees; a log that would turn more is left out. It bounds the search too
     #[arg(long, default_value_t = 5.0, value_name = "DEG", value_parser = positive)]
     max_turn: f64,
-    /// A log that would move less is kept as it is, m [default: a quarter of the side of a cell]
+    /// Smallest move, m; a log that would move less is kept [default: a quarter of the cell size]
     #[arg(long, value_name = "M", value_parser = not_negative)]
     min_move: Option<f64>,
     /// The program lattice [default: beside this one, or on the PATH]
@@ -54,8 +54,8 @@ impl Align {
             min_move_m: self.min_move,
         };
         let bar = progress::bar("align", count_logs(&tables)? as u64);
-        let mut tell = |done: usize| bar.set_position(done as u64);
-        let corrections = align(&tables, &self.against, &options, &mut tell)?;
+        let mut show = |done: usize| bar.set_position(done as u64);
+        let corrections = align(&tables, &self.against, &options, &mut show)?;
         bar.finish_and_clear();
         write_json(&self.out, &corrections)?;
         if self.json {
@@ -71,8 +71,7 @@ impl Align {
         };
         let (moved, kept) = (count(Action::Move), count(Action::Keep));
         println!(
-            "{} logs: {moved} to move, {kept} to keep as they are, {} to leave out; nothing is applied before \
-             `lattice fleet map --corrections {}`",
+            "{} logs: {moved} to move, {kept} to keep, {} to leave out; apply it by `lattice fleet map --corrections {}`",
             corrections.logs.len(),
             count(Action::LeaveOut),
             self.out.display()

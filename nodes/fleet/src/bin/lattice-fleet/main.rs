@@ -1,4 +1,4 @@
-//! The program `lattice-fleet`, which `lattice fleet` runs.
+//! The program `lattice-fleet`, which `lattice fleet` executes.
 
 mod align;
 mod map;
@@ -26,27 +26,31 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Add map files to a folder of Parquet tables, a part each
+    /// Add map files to a folder of Parquet tables, one part each
     ToTable(table::ToTable),
-    /// One map file of a folder of tables: of its only part, of one part, or of a merged map
+    /// Write the map file of the only part of a folder, of one part, or of a merged map
     FromTable(table::FromTable),
-    /// Map logs, a part for each or for each slice of its time; what is there already is left out
+    /// Map logs, one part for each log or slice of its time; existing parts are skipped
     Map(map::Map),
-    /// One map of all parts; tiles whose parts are as before are kept
+    /// Merge all parts into one map; tiles whose parts are unchanged are kept
     Merge(merge::Merge),
-    /// Propose a correction of the poses of logs by a merged map, each with a verdict
+    /// Propose pose corrections of logs from a merged map, each with a verdict
     Align(align::Align),
-    /// Parts, tiles and what is damaged, left over or not merged yet
+    /// Show parts, tiles, damaged files, unfinished parts and tiles to merge
     Status(status::Status),
-    /// Be the scheduler or an executor of a Ballista cluster
+    /// Run the scheduler or an executor of a Ballista cluster
     #[cfg(feature = "ballista")]
     #[command(subcommand)]
     Serve(serve::Serve),
 }
 
-/// Errors are one line on standard error and a non-zero status.
+/// Runs a command. An error is printed on standard error with a non-zero exit status.
 fn main() -> ExitCode {
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn")).init();
+    if let Err(error) = lattice_fleet::stop::handle_signals() {
+        eprintln!("lattice fleet: signals cannot be handled: {error}");
+        return ExitCode::FAILURE;
+    }
     let result = match Cli::parse().command {
         Command::ToTable(command) => command.run(),
         Command::FromTable(command) => command.run(),
@@ -57,6 +61,7 @@ fn main() -> ExitCode {
         #[cfg(feature = "ballista")]
         Command::Serve(command) => command.run(),
     };
+    lattice_fleet::stop::wait_if_stopping();
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -66,7 +71,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs what waits for the engine.
+/// Runs a future of the engine.
 fn block_on<T>(threads: usize, work: impl Future<Output = Result<T>>) -> Result<T> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(threads.max(1))
@@ -92,13 +97,13 @@ fn program_lattice(given: Option<PathBuf>) -> PathBuf {
 fn positive(text: &str) -> std::result::Result<f64, String> {
     match not_negative(text) {
         Ok(value) if value > 0.0 => Ok(value),
-        _ => Err("a number above 0 is needed".to_owned()),
+        _ => Err(format!("{text:?} is not a number above 0")),
     }
 }
 
 fn not_negative(text: &str) -> std::result::Result<f64, String> {
     match text.parse() {
         Ok(value) if value >= 0.0 && f64::is_finite(value) => Ok(value),
-        _ => Err("a number of at least 0 is needed".to_owned()),
+        _ => Err(format!("{text:?} is not a number from 0")),
     }
 }

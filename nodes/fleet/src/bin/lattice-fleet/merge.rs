@@ -30,13 +30,16 @@ pub struct Merge {
     /// Threads of the embedded engine; 0: all cores
     #[arg(long, default_value_t = 0)]
     threads: usize,
-    /// Memory of the embedded engine for what it groups, MB; beyond it uses temporary files
+    /// Memory of the embedded engine for grouping, MB; more is spilled to temporary files
     #[arg(long, default_value_t = 1024, value_name = "MB")]
     memory: usize,
-    /// Rows of the parts that one query takes; bounds the memory for its answer
+    /// Input rows of one query; bounds the memory for its result
     #[arg(long, default_value_t = 4_000_000, value_name = "N")]
     rows_at_once: u64,
-    /// Print the figures as JSON
+    /// Merge logs without a geodetic origin as they are: the poses of all logs are in one map frame
+    #[arg(long)]
+    same_frame: bool,
+    /// Print the report as JSON
     #[arg(long)]
     json: bool,
 }
@@ -59,12 +62,13 @@ impl Merge {
                 memory_bytes: self.memory.saturating_mul(1 << 20),
             },
             rows_at_once: self.rows_at_once,
+            same_frame: self.same_frame,
         };
         let bar = progress::bar("merge", 1000);
-        let mut tell = |done: f64| bar.set_position((done * 1000.0) as u64);
-        let report = block_on(threads, merge(&tables, &options, &mut tell))?;
+        let mut show = |done: f64| bar.set_position((done * 1000.0) as u64);
+        let report = block_on(threads, merge(&tables, &options, &mut show))?;
         if let Some(path) = &self.map_out {
-            bar.set_message("writes the map file");
+            bar.set_message("writing the map file");
             write_map(&read_merged(&options.out)?, path, None)?;
         }
         bar.finish_and_clear();
@@ -73,7 +77,7 @@ impl Merge {
             return Ok(());
         }
         println!(
-            "{} parts: {} voxels of {} points in {} tiles, {} of them kept as they were, {} bytes, {:.2} s",
+            "{} parts: {} voxels of {} points in {} tiles, {} of them kept, {} bytes, {:.2} s",
             report.parts,
             report.voxels,
             report.points,

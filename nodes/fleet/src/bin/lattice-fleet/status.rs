@@ -15,7 +15,7 @@ pub struct Status {
     /// Folder of the merged map [default: the folder `merged` of the tables]
     #[arg(long, value_name = "DIR")]
     merged: Option<PathBuf>,
-    /// Read every file through and compare it with what was written
+    /// Read every file and compare it with its manifest
     #[arg(long)]
     verify: bool,
     /// Print as JSON
@@ -36,13 +36,10 @@ impl Status {
             println!("rows           {}", status.rows);
             println!("bytes          {}", status.bytes);
             println!(
-                "tiles          {}, {} of them merged as they are now",
+                "tiles          {}, {} of them up to date in the merged map",
                 status.tiles, status.tiles_merged
             );
-            println!(
-                "left over      {} unfinished parts in tmp",
-                status.unfinished
-            );
+            println!("unfinished     {} parts in tmp", status.unfinished);
         }
         match status.damaged.len() {
             0 => Ok(()),

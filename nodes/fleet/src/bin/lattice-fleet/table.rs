@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
 use lattice_fleet::Result;
+use lattice_fleet::compatibility::OWN_FRAME;
 use lattice_fleet::files::{FileId, at, write_whole};
 use lattice_fleet::merged::{MERGED_FILE, read_merged};
 use lattice_fleet::part::{PartInfo, Source};
@@ -16,12 +17,15 @@ pub struct ToTable {
     /// Map files
     #[arg(required = true)]
     maps: Vec<PathBuf>,
-    /// Folder of tables, made if it is not there; a map that it has already counts once
+    /// Folder of tables, created if needed; a map that it has already counts once
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
     /// Origin of the maps: latitude and longitude in degrees, height above the ellipsoid in m
     #[arg(long, num_args = 3, value_names = ["LAT", "LON", "HEIGHT"], allow_negative_numbers = true)]
     origin: Option<Vec<f64>>,
+    /// The map frame of each map begins where its log begins, as without a geodetic origin; `lattice replay` says so
+    #[arg(long, conflicts_with = "origin")]
+    own_frame: bool,
     /// Print the names of the parts as JSON
     #[arg(long)]
     json: bool,
@@ -35,7 +39,7 @@ pub struct FromTable {
     /// Map file to write
     #[arg(long, short)]
     out: PathBuf,
-    /// Pack by zstd, at a level from 1 to 19 (--zstd=LEVEL)
+    /// Compress by zstd, at a level of 1..=19 (--zstd=LEVEL)
     #[arg(
         long, value_name = "LEVEL", num_args = 0..=1, require_equals = true,
         default_missing_value = "3", value_parser = clap::value_parser!(i32).range(1..=19),
@@ -51,10 +55,12 @@ impl ToTable {
             Some(given) => Some(
                 given
                     .try_into()
-                    .map_err(|_| "--origin takes three numbers")?,
+                    .map_err(|_| "--origin needs three numbers")?,
             ),
             None => None,
         };
+        let mut settings: Vec<_> = origin.iter().map(|at| format!("--origin {at:?}")).collect();
+        settings.extend(self.own_frame.then(|| OWN_FRAME.to_owned()));
         let mut names = Vec::new();
         for path in &self.maps {
             let map = read_map_file(path)?;
@@ -63,8 +69,9 @@ impl ToTable {
                 path: path.display().to_string(),
                 sha256: FileId::of(path).map_err(|error| at(path, error))?.sha256,
                 slice_s: (0.0, None),
-                settings: origin.iter().map(|at| format!("--origin {at:?}")).collect(),
+                settings: settings.clone(),
                 program: String::new(),
+                placed: false,
             };
             let voxels = map.keys().len();
             let added = tables
@@ -74,7 +81,7 @@ impl ToTable {
                 let there = if added.new {
                     ""
                 } else {
-                    ", which was there already"
+                    ", which exists already"
                 };
                 println!(
                     "{}: {voxels} voxels, part {}{there}",
@@ -115,8 +122,7 @@ fn read(folder: &Path) -> Result<MapContents> {
         [part] => read_map(&part.folder, &part.info.map, &part.info.tiles),
         parts => {
             let count = parts.len();
-            let reason =
-                format!("{count} parts, not one: make one map of them by `lattice fleet merge`");
+            let reason = format!("{count} parts, not one: merge them by `lattice fleet merge`");
             Err(at(folder, reason))
         }
     }
