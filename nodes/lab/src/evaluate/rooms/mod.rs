@@ -169,6 +169,9 @@ mod tests {
         let [off_m, sigma_m, _] = trial.middle.unwrap();
         assert!(trial.is_accepted() && off_m < 0.02 && sigma_m < 0.02);
         let report = crate::report::markdown(&rooms_report(&[trial]));
-        assert!(report.contains("office, low sensor | 1 | 1, 100 % | 0, 0 %"), "{report}");
+        assert!(
+            report.contains("office, low sensor | 1 | 1, 100 % | 0, 0 %"),
+            "{report}"
+        );
     }
 }
