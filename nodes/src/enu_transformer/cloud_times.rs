@@ -19,19 +19,20 @@ pub(crate) struct CloudTimes {
 
 impl CloudTimes {
     /// Checks the layout of a cloud and reads its times, unless `time` is `None`; notes what was read otherwise than
-    /// declared.
+    /// declared. `offset_ns` is added to all times.
     pub fn read(
         topic: &str,
         message: &PointCloud2,
         max_points: usize,
         time: Option<&TimeOptions>,
+        offset_ns: i64,
         notes: &mut CloudNotes,
     ) -> Result<Self, CloudError> {
         let stamp_ns = message.header.stamp.to_ns();
         let (layout, mended) = cloud::mended_layout_of(message);
         notes.on_layout(topic, &mended);
         let view = layout.view(&message.data, &CloudLimits { max_points })?;
-        let times_ns = match time {
+        let mut times_ns = match time {
             Some(time) => {
                 let time = cloud_input::time_options(message, time);
                 let found = view.point_times(stamp_ns, &time)?;
@@ -40,6 +41,12 @@ impl CloudTimes {
             }
             None => None,
         };
+        let stamp_ns = stamp_ns.saturating_add(offset_ns);
+        if offset_ns != 0 {
+            let all = times_ns.iter_mut().flatten();
+            all.filter(|t| **t != NO_TIME_NS)
+                .for_each(|t| *t = t.saturating_add(offset_ns));
+        }
         let known = times_ns.iter().flatten().filter(|t| **t != NO_TIME_NS);
         let span = known.fold(None, |span, &t| {
             let (first, last) = span.unwrap_or((t, t));

@@ -13,10 +13,16 @@ pub(super) enum Drop {
     Unconverted(CloudInputError),
     BeforePoses {
         by_ns: i64,
+        /// Time from the cloud to the newest pose.
+        behind_ns: i64,
     },
     PoseGap(PoseMiss),
     /// No covering pose at the end of the wait; `None`: the input ended.
-    PoseLate(Option<PoseMiss>),
+    PoseLate {
+        miss: Option<PoseMiss>,
+        /// Time from the newest pose at the reception to the cloud; `None` if no pose came since.
+        ahead_ns: Option<i64>,
+    },
     NoMount {
         frame: String,
         miss: TfMiss,
@@ -44,7 +50,7 @@ impl EnuTransformer {
             }
             Drop::BeforePoses { .. } => (&mut counts.clouds_before_poses, "clouds_before_poses"),
             Drop::PoseGap(_) => (&mut counts.clouds_pose_gap, "clouds_pose_gap"),
-            Drop::PoseLate(_) => (&mut counts.clouds_pose_late, "clouds_pose_late"),
+            Drop::PoseLate { .. } => (&mut counts.clouds_pose_late, "clouds_pose_late"),
             Drop::NoMount { .. } => (&mut counts.clouds_no_mount, "clouds_no_mount"),
             Drop::TimeJump => (&mut counts.clouds_time_jump, "clouds_time_jump"),
             Drop::QueueFull => (&mut counts.clouds_queue_full, "clouds_queue_full"),
@@ -67,8 +73,10 @@ impl EnuTransformer {
         match reason {
             Drop::Malformed(error) => error.to_string(),
             Drop::Unconverted(error) => error.to_string(),
-            Drop::BeforePoses { by_ns } => {
-                format!("{:.3} s before the first pose", seconds(*by_ns))
+            Drop::BeforePoses { by_ns, behind_ns } => {
+                let by_s = seconds(*by_ns);
+                let clocks = other_clock(seconds(*behind_ns));
+                format!("{by_s:.3} s before the first pose{clocks}")
             }
             Drop::PoseGap(PoseMiss::Gap { gap_ns, .. }) => {
                 let (gap_s, max_gap_s) = (seconds(*gap_ns), options.max_pose_gap_s);
@@ -86,16 +94,24 @@ impl EnuTransformer {
                 )
             }
             Drop::PoseGap(miss) => miss.to_string(),
-            Drop::PoseLate(_) if no_poses => match poses {
+            Drop::PoseLate { .. } if no_poses => match poses {
                 Some(poses) => format!("no usable pose; {poses}"),
                 None => self.no_pose(),
             },
-            Drop::PoseLate(Some(PoseMiss::AfterEnd { by_ns })) => format!(
-                "{:.3} s after the newest pose, and none came within {} s (`max_wait_s`)",
-                seconds(*by_ns),
-                options.longest_wait_s()
-            ),
-            Drop::PoseLate(_) => "no pose that covers it before the end of the input".to_owned(),
+            Drop::PoseLate {
+                miss: Some(PoseMiss::AfterEnd { by_ns }),
+                ahead_ns,
+            } => {
+                let (by_s, wait_s) = (seconds(*by_ns), options.longest_wait_s());
+                let clocks =
+                    ahead_ns.map_or_else(String::new, |by_ns| other_clock(-seconds(by_ns)));
+                format!(
+                    "{by_s:.3} s after the newest pose, and none came within {wait_s} s (`max_wait_s`){clocks}"
+                )
+            }
+            Drop::PoseLate { .. } => {
+                "no pose that covers it before the end of the input".to_owned()
+            }
             Drop::NoMount { frame, miss } => self.no_mount(frame, miss),
             Drop::TimeJump => "time was set back while it waited for its pose".to_owned(),
             Drop::QueueFull => format!(
@@ -132,6 +148,37 @@ impl EnuTransformer {
                 "{missing}: publish the mount of {frame} on /tf_static, or, if the poses are those of {frame} itself, set `-p base_frame:={frame}`"
             ),
         }
+    }
+}
+
+/// Differences of common clocks, s: from GPS time to UTC, to TAI, and from UTC to TAI.
+const CLOCKS_S: [(f64, &str); 3] = [
+    (18.0, "that of GPS time and UTC"),
+    (19.0, "that of GPS time and TAI"),
+    (37.0, "that of UTC and TAI, as of PTP"),
+];
+/// Difference from one of them, s: of a delay of the poses.
+const CLOCK_S: f64 = 0.5;
+/// Least difference that is hardly a delay of the poses, s.
+const LEAST_OFFSET_S: f64 = 1.5;
+
+/// Remedy for stamps of clouds that need `offset_s` to be those of the poses that come with them.
+fn other_clock(offset_s: f64) -> String {
+    if offset_s.abs() < LEAST_OFFSET_S {
+        return String::new();
+    }
+    let mut clocks = CLOCKS_S.iter();
+    let known = clocks.find(|(s, _)| (offset_s.abs() - s).abs() < CLOCK_S);
+    match known {
+        Some((s, name)) => {
+            let offset_s = s.copysign(offset_s);
+            format!(
+                "; the clocks of clouds and poses differ by {s} s, {name}: set `time.offset_s: {offset_s}`"
+            )
+        }
+        None => format!(
+            "; if the clocks of clouds and poses differ, set `time.offset_s: {offset_s:.1}`"
+        ),
     }
 }
 

@@ -218,6 +218,7 @@ impl EnuTransformer {
                     return out;
                 };
                 cloud.clock = clock;
+                cloud.newest_pose_ns = newest_ns;
                 let gone = self.waiting.push(cloud);
                 for cloud in gone {
                     self.drop_cloud(&cloud.topic, &Drop::QueueFull);
@@ -259,7 +260,13 @@ impl EnuTransformer {
                 Ok(()) => self.place(&cloud, &mut out),
                 Err(uncovered) => {
                     let reason = match uncovered.reason {
-                        Drop::PoseLate(Some(PoseMiss::AfterEnd { .. })) => Drop::PoseLate(None),
+                        Drop::PoseLate {
+                            miss: Some(PoseMiss::AfterEnd { .. }),
+                            ahead_ns,
+                        } => Drop::PoseLate {
+                            miss: None,
+                            ahead_ns,
+                        },
                         reason => reason,
                     };
                     self.drop_cloud(&cloud.topic, &reason);

@@ -37,6 +37,8 @@ pub struct TransformerOptions {
     pub max_cloud_points: usize,
     /// Field, unit and reference of the times of points.
     pub time: TimeOptions,
+    /// Time added to those of clouds, in ns: their clock is that of the poses then.
+    pub time_offset_ns: i64,
     /// True if points are moved to their place at their own time.
     pub deskew: bool,
     /// Longest wait of a cloud for the pose that covers it, in s of message time.
@@ -61,6 +63,12 @@ pub struct TransformerOptions {
 
 /// Default speed limit of the machine, above that of road vehicles.
 const MAX_SPEED_M_PER_S: f64 = 50.0;
+
+/// Limit of the offset of the times of clouds, s: a day, more than any time zone.
+const MAX_OFFSET_S: f64 = 86_400.0;
+
+/// Longest time by which the offset extends the wait of clouds and the span of poses, s: more than the 37 s from UTC to TAI.
+const MAX_SPAN_S: f64 = 60.0;
 
 /// Limit of fields passed through.
 const MAX_PASS_FIELDS: usize = 64;
@@ -99,6 +107,7 @@ impl TransformerOptions {
             max_range_m: f64::INFINITY,
             max_cloud_points: 4_000_000,
             time: TimeOptions::default(),
+            time_offset_ns: 0,
             deskew: true,
             max_wait_s: 1.0,
             max_pose_gap_s: 0.25,
@@ -150,6 +159,11 @@ impl TransformerOptions {
         options.max_cloud_points = params.positive("max_cloud_points", options.max_cloud_points)?;
         options.deskew = params.bool("deskew", options.deskew)?;
         options.time = time_options(params)?;
+        let offset_s = params.f64_in("time.offset_s", 0.0, -MAX_OFFSET_S..=MAX_OFFSET_S)?;
+        options.time_offset_ns = (offset_s * 1e9).round() as i64;
+        // Clouds of a log whose order is that of its stamps come as much before or behind their poses.
+        options.max_wait_s += offset_s.clamp(0.0, MAX_SPAN_S);
+        options.pose_span_s += (-offset_s).clamp(0.0, MAX_SPAN_S);
         options.max_wait_s = not_negative(params, "max_wait_s", options.max_wait_s)?;
         options.max_pose_gap_s = not_negative(params, "max_pose_gap_s", options.max_pose_gap_s)?;
         options.pose_span_s = not_negative(params, "pose_span_s", options.pose_span_s)?;

@@ -102,6 +102,10 @@ impl EnuTransformer {
         if is_newest {
             self.clocks.on_step();
             self.attitudes.on_pose(&pose, &self.options);
+            #[cfg(feature = "bags")]
+            if let Some(samples) = &mut self.samples {
+                samples.on_pose(&pose);
+            }
             self.announce_pose(&pose, out);
         }
     }

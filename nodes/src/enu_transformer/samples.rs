@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use lattice_core::cloud::{CloudLimits, NO_TIME_NS};
+use lattice_core::pose::StampedPose;
 use lattice_core::registration::mounts::{BasePose, MountSamples};
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -16,6 +17,9 @@ use crate::convert::cloud;
 const HALF_SPAN_NS: i64 = 10_000_000;
 /// Points of a cloud within this time share a pose, ns.
 const POSE_NS: i64 = 100_000;
+/// Least time between two poses of the way, ns, and the most of them: more than an hour.
+const WAY_NS: i64 = 20_000_000;
+const MAX_WAY: usize = 200_000;
 /// Points nearer to the sensor are of the machine itself, metres.
 const MIN_RANGE_M: f64 = 0.3;
 
@@ -36,6 +40,18 @@ pub struct StatedMount {
     pub is_moving: bool,
 }
 
+/// Point that is kept.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    /// Number of the point in the log.
+    number: u64,
+    /// Place of its pose.
+    pose: u32,
+    /// Place of its sensor in the mounts.
+    sensor: usize,
+    in_base_m: Vector3<f64>,
+}
+
 /// Points kept for the calibration of mounts.
 #[derive(Debug, Default)]
 pub struct Samples {
@@ -44,13 +60,16 @@ pub struct Samples {
     /// A point is kept if its number, scrambled, has this many low bits that are 0.
     thinning: u32,
     seen: u64,
-    kept: Vec<(u64, u32, Vector3<f64>)>,
+    kept: Vec<Kept>,
     poses: Vec<BasePose>,
     sensor_sum_m: Vector3<f64>,
     clouds: u32,
     mounts: Vec<StatedMount>,
     parents: BTreeMap<String, String>,
     bodies: Option<(Body, Body)>,
+    way: Vec<StampedPose>,
+    /// Least time between two poses of the way, ns.
+    way_ns: i64,
     base_from_ins: Option<Isometry3<f64>>,
 }
 
@@ -59,10 +78,28 @@ pub struct Samples {
 pub struct LogSamples {
     /// Points and poses.
     pub samples: MountSamples,
+    /// Place in `mounts` of the sensor of each point.
+    pub sensors: Vec<usize>,
     /// Mounts, in the order of their first clouds.
     pub mounts: Vec<StatedMount>,
     /// Lever arm and boresight of the INS; `None` if poses are those of the base.
     pub base_from_ins: Option<Isometry3<f64>>,
+}
+
+impl LogSamples {
+    /// Samples of one of the mounts.
+    pub fn of_sensor(&self, sensor: usize) -> MountSamples {
+        let mount = self.mounts.get(sensor);
+        let points = self.samples.points.iter().zip(&self.sensors);
+        let points = points.filter(|(_, of)| **of == sensor);
+        MountSamples {
+            points: points.map(|(point, _)| *point).collect(),
+            sensor_m: mount.map_or_else(Vector3::zeros, |mount| {
+                mount.base_from_sensor.translation.vector
+            }),
+            ..self.samples.clone()
+        }
+    }
 }
 
 impl Samples {
@@ -78,6 +115,23 @@ impl Samples {
         self.bodies = Some((position_of.clone(), attitude_of.clone()));
     }
 
+    /// Keeps the next pose of the base, in order of time.
+    pub(super) fn on_pose(&mut self, pose: &StampedPose) {
+        let is_due =
+            |last: &StampedPose| pose.stamp_ns.saturating_sub(last.stamp_ns) >= self.way_ns;
+        if self.way.last().is_none_or(is_due) {
+            self.way.push(*pose);
+        }
+        if self.way.len() > MAX_WAY {
+            self.way_ns *= 2;
+            let mut place = 0;
+            self.way.retain(|_| {
+                place += 1;
+                place % 2 == 1
+            });
+        }
+    }
+
     fn is_kept(number: u64, thinning: u32) -> bool {
         let scrambled = number.wrapping_mul(0x9E37_79B9_7F4A_7C15);
         (scrambled ^ (scrambled >> 32)).trailing_zeros() >= thinning
@@ -91,7 +145,7 @@ impl Samples {
             self.thinning += 1;
             let thinning = self.thinning;
             self.kept
-                .retain(|(number, _, _)| Self::is_kept(*number, thinning));
+                .retain(|kept| Self::is_kept(kept.number, thinning));
         }
         self.leave_poses_out();
     }
@@ -100,9 +154,9 @@ impl Samples {
     fn leave_poses_out(&mut self) {
         let mut places: BTreeMap<u32, u32> = BTreeMap::new();
         let mut poses = Vec::new();
-        for (_, place, _) in &mut self.kept {
-            *place = *places.entry(*place).or_insert_with(|| {
-                poses.extend(self.poses.get(*place as usize).copied());
+        for Kept { pose, .. } in &mut self.kept {
+            *pose = *places.entry(*pose).or_insert_with(|| {
+                poses.extend(self.poses.get(*pose as usize).copied());
                 poses.len().saturating_sub(1) as u32
             });
         }
@@ -110,12 +164,14 @@ impl Samples {
     }
 
     fn finish(self) -> LogSamples {
-        let points = self.kept.into_iter();
+        let points = self.kept.iter();
         LogSamples {
+            sensors: self.kept.iter().map(|kept| kept.sensor).collect(),
             samples: MountSamples {
                 poses: self.poses,
-                points: points.map(|(_, place, point)| (place, point)).collect(),
+                points: points.map(|kept| (kept.pose, kept.in_base_m)).collect(),
                 sensor_m: self.sensor_sum_m / f64::from(self.clouds.max(1)),
+                way: self.way,
             },
             mounts: self.mounts,
             base_from_ins: self.base_from_ins,
@@ -128,6 +184,7 @@ impl EnuTransformer {
     pub(crate) fn keep_samples(&mut self, limit: usize) {
         self.samples = Some(Samples {
             limit,
+            way_ns: WAY_NS,
             ..Samples::default()
         });
     }
@@ -149,6 +206,8 @@ impl EnuTransformer {
         let base_from_sensor = self.stated_mount(waiting, samples)?;
         samples.sensor_sum_m += base_from_sensor.translation.vector;
         samples.clouds += 1;
+        let sensor = { samples.mounts.iter() }.position(|one| one.frame == waiting.frame);
+        let sensor = sensor.unwrap_or_default();
         let mut places: BTreeMap<i64, Option<(u32, Isometry3<f64>)>> = BTreeMap::new();
         for i in 0..view.len() {
             samples.seen += 1;
@@ -175,8 +234,13 @@ impl EnuTransformer {
                 Some((samples.poses.len() as u32 - 1, mount))
             });
             if let Some((place, mount)) = found {
-                let in_base = (*mount * Point3::from(point_m)).coords;
-                samples.kept.push((samples.seen, *place, in_base));
+                let in_base_m = (*mount * Point3::from(point_m)).coords;
+                samples.kept.push(Kept {
+                    number: samples.seen,
+                    pose: *place,
+                    sensor,
+                    in_base_m,
+                });
             }
         }
         samples.thin();
@@ -255,7 +319,12 @@ mod tests {
             });
             let place = samples.poses.len() as u32 - 1;
             let point = Vector3::x() * f64::from(number);
-            samples.kept.push((number.into(), place, point));
+            samples.kept.push(Kept {
+                number: number.into(),
+                pose: place,
+                sensor: 0,
+                in_base_m: point,
+            });
             samples.thin();
             assert!(samples.kept.len() <= 100 && samples.poses.len() <= 100);
         }

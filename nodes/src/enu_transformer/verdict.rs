@@ -42,9 +42,17 @@ impl EnuTransformer {
         for stamp_ns in [cloud.first_ns, cloud.last_ns] {
             self.map_from_base(stamp_ns).map_err(|miss| match miss {
                 PoseMiss::Empty | PoseMiss::AfterEnd { .. } => {
-                    uncovered(Drop::PoseLate(Some(miss)), true)
+                    let (then_ns, now_ns) = (cloud.newest_pose_ns, self.poses.newest_ns());
+                    let then_ns = then_ns.filter(|then_ns| now_ns > Some(*then_ns));
+                    let ahead_ns = then_ns.map(|then_ns| stamp_ns.saturating_sub(then_ns));
+                    let miss = Some(miss);
+                    uncovered(Drop::PoseLate { miss, ahead_ns }, true)
                 }
-                PoseMiss::BeforeStart { by_ns } => uncovered(Drop::BeforePoses { by_ns }, false),
+                PoseMiss::BeforeStart { by_ns } => {
+                    let newest_ns = self.poses.newest_ns().unwrap_or(stamp_ns);
+                    let behind_ns = newest_ns.saturating_sub(stamp_ns);
+                    uncovered(Drop::BeforePoses { by_ns, behind_ns }, false)
+                }
                 PoseMiss::Gap { .. } => uncovered(Drop::PoseGap(miss), false),
             })?;
             self.mount(&cloud.frame, stamp_ns).map_err(|miss| {

@@ -28,6 +28,8 @@ pub struct WaitingCloud {
     pub arrived_ns: i64,
     /// Clock state of its topic at the reception.
     pub clock: CloudClock,
+    /// Newest pose at the reception.
+    pub newest_pose_ns: Option<i64>,
 }
 
 impl WaitingCloud {
@@ -39,7 +41,8 @@ impl WaitingCloud {
         notes: &mut CloudNotes,
     ) -> Result<Self, CloudError> {
         let time = options.deskew.then_some(&options.time);
-        let times = CloudTimes::read(topic, &message, options.max_cloud_points, time, notes)?;
+        let (max_points, offset_ns) = (options.max_cloud_points, options.time_offset_ns);
+        let times = CloudTimes::read(topic, &message, max_points, time, offset_ns, notes)?;
         Ok(Self {
             topic: topic.into(),
             frame: message.header.frame_id.trim_start_matches('/').to_owned(),
@@ -49,6 +52,7 @@ impl WaitingCloud {
             last_ns: times.last_ns,
             arrived_ns,
             clock: CloudClock::default(),
+            newest_pose_ns: None,
             message,
         })
     }

@@ -252,7 +252,7 @@ impl LidarOdometry {
         let malformed = |error: &dyn std::fmt::Display| ("clouds_malformed", error.to_string());
         let time = options.deskew.then_some(&options.time);
         let max_points = options.max_cloud_points;
-        let times = CloudTimes::read(topic, message, max_points, time, &mut self.notes)
+        let times = CloudTimes::read(topic, message, max_points, time, 0, &mut self.notes)
             .map_err(|error| malformed(&error))?;
         if let Some(last_ns) = self.last.as_ref().map(|last| last.end_ns)
             && times.last_ns <= last_ns

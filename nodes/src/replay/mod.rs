@@ -159,6 +159,7 @@ impl Pipeline {
             odometry: None,
             implausible_rows: 0,
             cuts: Vec::new(),
+            fit: Vec::new(),
             choices: Vec::new(),
             wall_s: 0.0,
         }

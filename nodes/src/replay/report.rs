@@ -52,6 +52,9 @@ pub struct RunReport {
     /// Files of the log that end early, each with the number of its messages.
     #[serde(default)]
     pub cuts: Vec<String>,
+    /// Corrections of mounts and stamps with which the first minute of the log fits better.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fit: Vec<String>,
     /// Topics that were taken for clouds, poses and transforms, and those that were not, with the reason.
     #[serde(default)]
     pub choices: Vec<String>,
@@ -215,6 +218,9 @@ impl fmt::Display for RunReport {
         for note in self.transformer.notes.iter().filter(|note| note.is_warning) {
             writeln!(f, "note: {}: {}", note.topic, note.text)?;
         }
+        for note in &self.fit {
+            writeln!(f, "note: {note}")?;
+        }
         let losses = self.losses();
         if losses.is_empty() {
             writeln!(f, "dropped: none")?;
@@ -277,6 +283,7 @@ mod tests {
             odometry: None,
             implausible_rows: 0,
             cuts: Vec::new(),
+            fit: Vec::new(),
             choices: Vec::new(),
             wall_s: 1.0,
         };

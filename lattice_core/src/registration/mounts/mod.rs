@@ -14,13 +14,16 @@ mod planes;
 mod refine;
 #[cfg(test)]
 mod tests;
+mod time_scan;
 
 use nalgebra::{Isometry3, Vector3};
 use thiserror::Error;
 
 pub use correction::MountCorrection;
 
+use crate::pose::StampedPose;
 use refine::Refined;
+use time_scan::Offset;
 
 /// Names of the seven numbers of a mount, in the order of [`MountEstimate::numbers`].
 pub const MOUNT_NUMBERS: [&str; 7] = ["roll", "pitch", "yaw", "x", "y", "z", "time"];
@@ -30,6 +33,8 @@ const COUNT_CELL_M: f64 = 0.25;
 /// Rotation (rad) and shift (m) above which a correction lowers the number of occupied voxels.
 const LARGE_RAD: f64 = 0.02;
 const LARGE_M: f64 = 0.15;
+/// Smallest offset of times that the refinement does not reach from none, seconds.
+const LEAST_OFFSET_S: f64 = 0.03;
 /// Minimum number of points.
 const MIN_POINTS: usize = 2000;
 /// Minimum number of planar cells.
@@ -57,6 +62,8 @@ pub struct MountSamples {
     pub points: Vec<(u32, Vector3<f64>)>,
     /// Position of the sensor in the base frame by the stated mount, metres.
     pub sensor_m: Vector3<f64>,
+    /// Poses of the base by time, in the time of `poses`; without them the time offset is at most that of a driver.
+    pub way: Vec<StampedPose>,
 }
 
 /// Options of [`estimate_mount`].
@@ -115,6 +122,12 @@ pub enum MountError {
         moved_m: f64,
         /// Largest turn from the first pose, degrees.
         turned_deg: f64,
+    },
+    /// Times of the points that contradict the poses, where surfaces are too few for an estimate.
+    #[error("the points fit the poses with {offset_s:+.2} s added to their times")]
+    Stamps {
+        /// Time to add to those of the points, seconds.
+        offset_s: f64,
     },
     /// An optimum that is not better than the stated mount, or outside of the range of the search.
     #[error(
@@ -180,8 +193,8 @@ impl MountEstimate {
 
 /// Estimates the correction of the mount of a sensor.
 ///
-/// The stated mount is within 15 degrees about each axis and 1 m along each. Points and poses may be in any order; the
-/// result does not depend on the number of threads.
+/// The stated mount is within 15 degrees about each axis and 1 m along each, the stamps within 40 s of the poses. Points
+/// and poses may be in any order; the result does not depend on the number of threads.
 ///
 /// # Errors
 /// If points, planes or motion are too few, or if the best mount fits worse than the stated one.
@@ -189,12 +202,63 @@ pub fn estimate_mount(
     samples: &MountSamples,
     options: &MountOptions,
 ) -> Result<MountEstimate, MountError> {
+    check_motion(&samples.poses)?;
+    let offset = match options.with_time {
+        true => time_scan::search(samples),
+        false => Offset::Nothing,
+    };
+    match offset {
+        Offset::Nothing => estimate_from(samples, samples, options),
+        Offset::Far(offset_s) => {
+            let found = estimate_at(samples, offset_s, options);
+            found.map_err(|_| MountError::Stamps { offset_s })
+        }
+        Offset::Near(offset_s) => {
+            let stated = estimate_from(samples, samples, options);
+            if offset_s.abs() < LEAST_OFFSET_S {
+                return stated;
+            }
+            let moved = estimate_at(samples, offset_s, options);
+            match (&stated, &moved) {
+                (Ok(a), Ok(b)) if a.after.thickness_m <= b.after.thickness_m => stated,
+                (Ok(_), Err(_)) => stated,
+                _ => moved,
+            }
+        }
+    }
+}
+
+/// Estimate about an offset of the times of points.
+fn estimate_at(
+    samples: &MountSamples,
+    offset_s: f64,
+    options: &MountOptions,
+) -> Result<MountEstimate, MountError> {
+    let [stated, moved] = time_scan::moved(samples, offset_s);
+    let mut found = estimate_from(&stated, &moved, options)?;
+    found.correction.time_s += offset_s;
+    let [.., time] = &mut found.numbers;
+    if !time.is_observable {
+        // Known from the scan alone.
+        time.sigma = time.sigma.min(time_scan::SIGMA_S);
+        time.is_observable = true;
+    }
+    time.value += offset_s;
+    Ok(found)
+}
+
+/// Estimate from samples with the stated times, and with those to begin with.
+fn estimate_from(
+    stated: &MountSamples,
+    samples: &MountSamples,
+    options: &MountOptions,
+) -> Result<MountEstimate, MountError> {
+    let as_stated = &centered(stated);
     let samples = &centered(samples);
     if samples.points.len() < MIN_POINTS {
         let points = samples.points.len();
         return Err(MountError::FewPoints { points });
     }
-    check_motion(&samples.poses)?;
     let stated = MountCorrection::identity(samples.sensor_m);
     let start = coarse::search(samples, &stated);
     let Refined {
@@ -203,13 +267,12 @@ pub fn estimate_mount(
         planes,
         thickness_m,
     } = refine::refine(samples, &start, options)?;
-    let voxels = |at: &MountCorrection| coarse::occupied(samples, at, COUNT_CELL_M);
     let before = MountFit {
-        voxels: voxels(&stated),
-        thickness_m: refine::thickness_m(samples, &stated),
+        voxels: coarse::occupied(as_stated, &stated, COUNT_CELL_M),
+        thickness_m: refine::thickness_m(as_stated, &stated),
     };
     let after = MountFit {
-        voxels: voxels(&correction),
+        voxels: coarse::occupied(samples, &correction, COUNT_CELL_M),
         thickness_m,
     };
     let is_outside = |number: &MountNumber, range: f64| number.value.abs() > 1.2 * range;
@@ -266,6 +329,7 @@ fn centered(samples: &MountSamples) -> MountSamples {
         poses: poses.collect(),
         points: samples.points.iter().filter(is_valid).copied().collect(),
         sensor_m: samples.sensor_m,
+        way: Vec::new(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! `lattice replay`: maps from a log.
 
+mod check;
 mod depth;
 pub mod node_process;
 mod params;
@@ -15,6 +16,7 @@ use lattice_core::voxels::file::WriteOptions;
 use super::cell_size::CellSize;
 use super::progress::Progress;
 use super::{CliResult, Lattices, fleet, init_logging};
+pub use check::{Better, CHECK_POINTS, CHECK_S};
 use lattice_bag::BagReader;
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::enu_transformer::ins::InsSource;
@@ -86,6 +88,9 @@ pub struct Replay {
     /// Map although the attitudes contradict the way of the machine
     #[arg(long)]
     pub trust_attitude: bool,
+    /// Map without the check of stamps and mounts against the poses, on the first minute
+    #[arg(long)]
+    pub trust_stamps: bool,
     /// Print the report as JSON
     #[arg(long)]
     pub json: bool,
@@ -161,6 +166,7 @@ impl Replay {
             );
             return self.replay_planned(&bag, &plan);
         }
+        let fit = self.checked_poses(&bag, &plan)?;
         let lattices: Vec<_> = self.maps()?.into_iter().map(|map| map.lattice).collect();
         let cameras = plan.cameras.len();
         let most = MAX_LOOPBACK_NODES.saturating_sub(cameras) / 2;
@@ -174,13 +180,14 @@ impl Replay {
         }
         // Separate from robots and other replays, regardless of ROS_DOMAIN_ID.
         let domain = LoopbackDomain::take()?;
-        processes::run(&DdsReplay {
+        let report = processes::run(&DdsReplay {
             options: self,
             reader: &bag,
             plan: &plan,
             lattices,
             domain,
-        })
+        })?;
+        Ok(RunReport { fit, ..report })
     }
 
     fn replay_direct(&self) -> CliResult<RunReport> {
@@ -204,6 +211,7 @@ impl Replay {
     }
 
     fn replay_planned(&self, bag: &BagReader, plan: &TopicPlan) -> CliResult<RunReport> {
+        let fit = self.checked_poses(bag, plan)?;
         let transformer = self.transformer(plan)?;
         let mut maps = self.maps()?;
         for map in &mut maps {
@@ -224,6 +232,7 @@ impl Replay {
             let tell = &mut |done| progress.set(done);
             replay::run(bag, plan, &self.slice(), &mut pipeline, &source, tell)
         })?;
+        let report = RunReport { fit, ..report };
         progress.done();
         if self.refused(&report).is_some() {
             return Ok(report);

@@ -97,6 +97,7 @@ pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
         odometry: None,
         implausible_rows: replay.reader.implausible_rows(),
         cuts: replay.reader.cuts(),
+        fit: Vec::new(),
         choices: replay.plan.choices.clone(),
         wall_s: begin.elapsed().as_secs_f64(),
     };

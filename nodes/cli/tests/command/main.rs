@@ -30,6 +30,7 @@ mod point_files;
 mod record;
 mod respawn;
 mod signals;
+mod stamps;
 mod streams;
 mod unsent;
 mod versions;

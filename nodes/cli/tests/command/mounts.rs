@@ -74,6 +74,15 @@ fn a_wrong_boresight_of_the_loader_is_found_checked_and_gone_with_the_parameters
         stderr.contains("degrees better if turned about z: `lattice calibrate mounts"),
         "{stderr}"
     );
+    let wrong = ["-p", &wrong_arm, "-p", &wrong_turn];
+    let replay = [&["replay", "--direct", &log], &sensors[..], &wrong[..]].concat();
+    let output = lattice(&replay);
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{printed}");
+    assert!(
+        printed.contains("note: clouds fit") && printed.contains("better if turned about z"),
+        "{printed}"
+    );
     let (status, stdout, stderr) = run(&["-p", &wrong_arm, "-p", &wrong_turn, "--json"]);
     assert_eq!(status, 0, "{stderr}");
     let found: Value = serde_json::from_str(&stdout).unwrap();

@@ -7,14 +7,8 @@ use lattice_nodes::enu_transformer::{LogSamples, StatedMount};
 use nalgebra::Isometry3;
 use serde::Serialize;
 
-/// Least correction of a rotation that is called wrong, degrees.
-const WRONG_DEG: f64 = 0.3;
-/// Least correction of the lever arm that is called wrong, metres.
-const WRONG_M: f64 = 0.05;
-/// Least time offset that is called wrong, seconds.
+/// Least time offset that is shown as a parameter, seconds.
 const WRONG_S: f64 = 0.005;
-/// Standard deviations above which a correction is significant.
-const SIGNIFICANT: f64 = 3.0;
 
 /// Result of a calibration of mounts.
 #[derive(Serialize)]
@@ -218,43 +212,6 @@ impl Answer {
         }
         texts.join("; ")
     }
-
-    /// The largest significant correction, of its least one that matters; `None` if the stated mount fits.
-    pub fn wrong(&self) -> Option<String> {
-        let size = |number: &Number| {
-            let least = match number.unit {
-                "deg" => WRONG_DEG,
-                "m" => WRONG_M,
-                _ => WRONG_S,
-            };
-            number.correction.abs() / least
-        };
-        let is_wrong = |number: &&Number| {
-            let is_significant = number.correction.abs() > SIGNIFICANT * number.sigma;
-            number.remedy.is_none() && is_significant && size(number) > 1.0
-        };
-        let wrong = self.numbers.iter().filter(is_wrong);
-        let worst = wrong.max_by(|a, b| size(a).total_cmp(&size(b)))?;
-        let by = worst.correction;
-        let axis = match worst.name {
-            "roll" => "x",
-            "pitch" => "y",
-            "yaw" => "z",
-            name => name,
-        };
-        Some(match worst.unit {
-            "deg" => format!("{:.1} degrees better if turned about {axis}", by.abs()),
-            "m" => format!("{:.2} m better if moved along {axis}", by.abs()),
-            _ => format!("{:.3} s better if stamped {}", by.abs(), sooner(by)),
-        })
-    }
-}
-
-fn sooner(by_s: f64) -> &'static str {
-    match by_s > 0.0 {
-        true => "later",
-        false => "earlier",
-    }
 }
 
 fn list(values: &[f64; 3]) -> String {
@@ -338,7 +295,7 @@ impl fmt::Display for Answer {
             let by_s = time.correction;
             writeln!(
                 f,
-                "time           stamps of the clouds are {:.4} s too {}: correct them in the driver or by PTP; no parameter does",
+                "time           stamps of the clouds are {:.4} s too {}: correct them in the driver or by PTP, or set\n  time.offset_s: {by_s:.4}",
                 by_s.abs(),
                 if by_s > 0.0 { "early" } else { "late" }
             )?;

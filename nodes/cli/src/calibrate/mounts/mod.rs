@@ -12,16 +12,12 @@ use lattice_nodes::enu_transformer::ins::InsSource;
 use lattice_nodes::replay::{self, Role, RunReport, Slice, TopicPlan};
 
 use crate::progress::Progress;
-use crate::replay::Replay;
+use crate::replay::{Better, CHECK_POINTS, CHECK_S, Replay};
 use crate::{CliResult, init_logging};
 use answer::Answer;
 
 /// Most points of an estimate.
 const POINTS: usize = 300_000;
-/// Most points of a check.
-const CHECK_POINTS: usize = 80_000;
-/// Part of a log that a check reads, s.
-const CHECK_S: f64 = 60.0;
 
 /// Find where a sensor sits on the machine, from a log with poses
 ///
@@ -93,10 +89,10 @@ impl Mounts {
             print!("{answer}");
         }
         if self.check {
-            return match answer.wrong() {
-                Some(what) => {
+            return match Better::of(&estimate) {
+                Some(Better { text, .. }) => {
                     let log = self.log.display();
-                    Err(format!("clouds fit {what}: `lattice calibrate mounts {log}`").into())
+                    Err(format!("clouds fit {text}: `lattice calibrate mounts {log}`").into())
                 }
                 None if self.json => Ok(()),
                 None => {
@@ -177,6 +173,9 @@ impl Mounts {
                 "use a part of the log in which the machine drives and turns (--start, --stop)"
             }
             MountError::FewPlanes { .. } => "use a part of the log beside walls (--start, --stop)",
+            MountError::Stamps { offset_s } => {
+                return format!("{error}: set `time.offset_s: {offset_s:.1}`");
+            }
             MountError::NoFit { .. } => {
                 "state the mount on tf or by parameters to within this range, or check the poses by `lattice replay`; \
                  a search from nothing, of permuted and mirrored axes too, is not supported"
