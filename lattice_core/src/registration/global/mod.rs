@@ -14,6 +14,7 @@ mod covariance;
 mod fit_diagnostics;
 mod map;
 mod margin;
+mod opposite_sides;
 mod profile;
 mod rays;
 mod reinterpreted_cloud;

@@ -49,8 +49,9 @@ pub(super) fn select_and_classify(
         let near = all
             .iter()
             .filter(|c| c.is_near(&pose, &centroid, shift_m, turn_rad));
+        let probed = context.with_probed_variances(best, surfaces);
         near.fold(
-            context.with_probed_variances(best, surfaces),
+            context.with_uncertain_sides(best, probed),
             |covariance, alternative| {
                 let odds = ((alternative.total() - best.total()) / SOFTNESS)
                     .exp()

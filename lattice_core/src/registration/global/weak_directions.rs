@@ -1,8 +1,9 @@
 //! Weak directions of a pose: optimization of the pose and its variance along them by the likelihood.
 
-use nalgebra::{Isometry3, Point3, RowVector6, Vector6};
+use nalgebra::{Isometry3, Point3, RowVector6, Translation3, Vector6};
 use rayon::prelude::*;
 
+use super::super::likelihood::Fit;
 use super::calibration::{DirectionKind, WeakDirection};
 use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::PoseCovariance;
@@ -98,13 +99,19 @@ impl RegistrationContext<'_> {
     /// Variance along a direction about a pose, from the likelihoods of poses along it.
     fn variance(&self, candidate: &Candidate, kind: DirectionKind, along: &Direction) -> f64 {
         let unit = self.unit(kind);
-        let sides = (1..=STEPS).flat_map(|i| [f64::from(i), -f64::from(i)]);
-        let steps: Vec<f64> = sides.map(|step| step * unit).collect();
-        let steps = steps.par_iter().map(|step| {
-            let drop = candidate.total() - self.moved(candidate, along, *step).total();
-            (*step, drop / SOFTNESS)
-        });
-        variance(unit, &steps.collect::<Vec<_>>())
+        let drop = |step| candidate.total() - self.moved(candidate, along, step).total();
+        variance_of_steps(unit, drop)
+    }
+
+    /// Variance of a vertical translation about a pose by a likelihood model of the source, m^2.
+    pub fn vertical_variance(&self, candidate: &Candidate, fit: &Fit<'_>) -> f64 {
+        let pose = &candidate.target_from_source;
+        let total = |up_m: f64| {
+            let moved = Translation3::new(0.0, 0.0, up_m) * pose;
+            self.evaluate(fit, moved, candidate.method).total()
+        };
+        let here = total(0.0);
+        variance_of_steps(self.map.spacing_m, |up_m| here - total(up_m))
     }
 
     /// Step along a direction: one spacing of the map, or the rotation that moves the points by [`ROTATION_STEP`] of
@@ -124,6 +131,14 @@ impl RegistrationContext<'_> {
             .sqrt()
             .max(self.map.spacing_m)
     }
+}
+
+/// Second moment about 0 along a direction, given the decrease of the log-likelihood at a step.
+fn variance_of_steps(unit: f64, drop: impl Fn(f64) -> f64 + Sync) -> f64 {
+    let sides = (1..=STEPS).flat_map(|i| [f64::from(i), -f64::from(i)]);
+    let steps: Vec<f64> = sides.map(|step| step * unit).collect();
+    let steps = steps.par_iter().map(|step| (*step, drop(*step) / SOFTNESS));
+    variance(unit, &steps.collect::<Vec<_>>())
 }
 
 /// Second moment about 0 along a direction, given the steps and their decrease of the log-odds.

@@ -114,6 +114,23 @@ impl<'a> Fit<'a> {
         }
     }
 
+    /// Model without some points, by the index of each point.
+    pub fn without(&self, is_left_out: &[bool]) -> Fit<'a> {
+        let mut weights = self.weights.clone();
+        for (weight, _) in weights
+            .iter_mut()
+            .zip(is_left_out)
+            .filter(|(_, left_out)| **left_out)
+        {
+            *weight = 0.0;
+        }
+        Fit {
+            weights,
+            folds: self.folds.clone(),
+            ..*self
+        }
+    }
+
     /// Effective number of independent observations in the source.
     pub fn observations(&self) -> f64 {
         self.weights.iter().sum()
@@ -177,7 +194,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Weight of a source point.
-    fn weight(&self, i: usize) -> f64 {
+    pub fn weight(&self, i: usize) -> f64 {
         self.weights.get(i).copied().unwrap_or(0.0)
     }
 

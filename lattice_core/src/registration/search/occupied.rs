@@ -116,6 +116,18 @@ impl OccupiedGrid {
         })
     }
 
+    /// Distance of the first occupied cell in a direction (a unit vector) from a place, within `way_m`, metres.
+    pub fn distance_m(
+        &self,
+        from_m: &Point3<f64>,
+        direction: &Vector3<f64>,
+        way_m: std::ops::Range<f64>,
+    ) -> Option<f64> {
+        let steps = ((way_m.end - way_m.start) / self.grid.cell_m) as u32;
+        let mut distances_m = (0..=steps).map(|i| way_m.start + f64::from(i) * self.grid.cell_m);
+        distances_m.find(|distance_m| self.is_occupied(&(from_m + direction * *distance_m)))
+    }
+
     fn is_occupied(&self, place_m: &Point3<f64>) -> bool {
         let at = self.grid.index(self.grid.cell_of(&place_m.coords));
         at.and_then(|at| self.cells.get(at))

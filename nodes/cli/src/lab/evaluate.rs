@@ -2,7 +2,7 @@
 
 use super::evaluate_chain::Chain;
 use super::evaluate_kitti::Kitti;
-use super::evaluate_many::{Many, Reliability};
+use super::evaluate_many::{Many, Reliability, Rooms};
 use super::evaluate_odometry::OfDrives;
 use super::evaluate_scans::OfScans;
 use super::{Choice, choice, processors};
@@ -33,6 +33,8 @@ pub enum Evaluate {
     Chain(Chain),
     /// Find lidar scans of a simulated street in each other, 5 to 30 m apart, without a start
     Town(Many),
+    /// Calibrate a headset in captured rooms to maps of robots whose sensors are below or above the tables
+    Rooms(Rooms),
     /// Find parts of a given scan in another scan of the same place, without a start: what verdicts are worth there
     Scans(Box<OfScans>),
     /// Compare what verdicts of other evaluations stated with what was observed
@@ -133,6 +135,7 @@ impl Evaluate {
             Self::Traps(command) => command.traps(),
             Self::Chain(command) => command.run(),
             Self::Town(command) => command.town(),
+            Self::Rooms(command) => command.run(),
             Self::Scans(command) => command.run(),
             Self::Reliability(command) => command.run(),
             Self::Odometry(command) => command.run(),

@@ -1,12 +1,12 @@
-//! `lattice evaluate traps`, `town` and `reliability`.
+//! `lattice evaluate traps`, `town`, `rooms` and `reliability`.
 
 use super::evaluate::Remaining;
 use super::processors;
 use crate::CliResult;
 use clap::Args;
 use lattice_lab::evaluate::{
-    AdversarialScene, Case, Pair, Results, Settings, adversarial_report, reliability_report,
-    run_cases, settings_of, town_report,
+    AdversarialScene, Case, Pair, Results, RoomCase, Settings, adversarial_report,
+    reliability_report, rooms_report, run_cases, settings_of, town_report,
 };
 use lattice_lab::{AnyError, Report, markdown, write_report};
 use std::path::{Path, PathBuf};
@@ -64,6 +64,25 @@ impl Many {
     /// Writes and prints a report.
     pub fn show(&self, report: &Report) -> CliResult {
         show(report, &self.out)
+    }
+}
+
+/// Options of `lattice evaluate rooms`.
+#[derive(Args)]
+pub struct Rooms {
+    /// Rooms captured with a headset: JSON files in `captures` of npm `@iwer/sem` [default: an office of our own]
+    #[arg(value_name = "CAPTURES")]
+    captures: Vec<PathBuf>,
+    #[command(flatten)]
+    many: Many,
+}
+
+impl Rooms {
+    /// Runs the command.
+    pub fn run(self) -> CliResult {
+        let (cases, settings) = RoomCase::all(&self.captures)?;
+        let trials = self.many.measure(&cases, &settings)?.sorted();
+        self.many.show(&rooms_report(&trials))
     }
 }
 

@@ -63,6 +63,7 @@ fn seeds_and_maps_without_end_are_refused_at_once() {
         ("calibration", "maps"),
         ("traps", "seeds"),
         ("town", "seeds"),
+        ("rooms", "seeds"),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let out = ["--out", folder.path().to_str().unwrap()];

@@ -20,6 +20,7 @@ mod pairs;
 mod reliability;
 mod report;
 mod results;
+mod rooms;
 mod run;
 mod scans;
 mod settings;
@@ -40,6 +41,7 @@ pub use odometry::{OdometryLog, OdometryTrial, measure_log, odometry_report, run
 pub use reliability::reliability_report;
 pub use report::report;
 pub use results::Results;
+pub use rooms::{RoomCase, rooms_report};
 pub use run::run;
 pub use scans::{Scans, scans_report};
 #[cfg(test)]

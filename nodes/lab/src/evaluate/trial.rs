@@ -41,6 +41,10 @@ pub struct Trial {
     /// Shares of labels that are right, where a network gave them.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub labels: Option<LabelsRight>,
+    /// Middle of the seen points: its distance from the truth, its stated standard deviation in that direction, and its
+    /// height above the truth, metres.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub middle: Option<[f64; 3]>,
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub judged: Option<Judged>,
 }
@@ -156,6 +160,7 @@ impl Trial {
             wall_ms: rounded(wall_ms),
             overlap: None,
             labels: None,
+            middle: None,
             judged: None,
         }
     }
