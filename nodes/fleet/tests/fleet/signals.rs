@@ -89,7 +89,7 @@ fn nothing_is_left(mut command: Command, name: &str, number: i32, removes_folder
     let entries = || fs::read_dir(tables.join("tmp")).unwrap().count();
     assert_eq!(entries(), 2);
     signal(&running.0, name);
-    let status = running.0.wait_timeout(LONGEST).unwrap().expect("no end");
+    let status = running.0.wait_timeout(LONGEST).unwrap().unwrap();
     assert_eq!(status.signal(), Some(number), "{status}");
     wait_for("end of the replays", || {
         !replays().iter().any(|id| runs(id))
