@@ -48,6 +48,7 @@ fn execute(arguments: Vec<OsString>) -> CliResult {
 }
 
 /// Runs `lattice-fleet` with these arguments and waits for it.
+#[cfg(feature = "bags")]
 pub fn run(arguments: Vec<OsString>) -> CliResult {
     let program = program();
     let status = Command::new(&program).args(&arguments).status();
