@@ -134,7 +134,7 @@ def refusals():
         (lambda: VoxelMap(fcc).insert(np.zeros((4, 3)), labels=[1, 2, 3, 4]), "labels=True"),
         (lambda: VoxelMap(fcc, labels=True).insert(np.zeros((4, 3)), labels=[1, 2]), "4 points and 2 labels"),
         (lambda: VoxelMap(fcc, labels=True).insert(np.zeros((1, 3)), labels=[70_000]), "70000"),
-        (lambda: VoxelMap(fcc).merge(VoxelMap(Lattice("bcc", 1.0))), "same cells"),
+        (lambda: VoxelMap(fcc).merge(VoxelMap(Lattice("bcc", 1.0))), "same lattice"),
         (lambda: VoxelMap.load("/nowhere/map.lat"), "/nowhere/map.lat"),
         (lambda: VoxelMap.from_arrow(pa.table({"ix": [1]})), "lattice_map"),
         (lambda: VoxelMap.from_arrow(7), "__arrow_c_stream__"),
