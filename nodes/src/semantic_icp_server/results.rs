@@ -53,7 +53,8 @@ impl SemanticIcpServer {
             .current
             .as_ref()
             .map(|current| current.map_from_headset);
-        let moved = before.is_some_and(|before| !is_near(&before, &found.target_from_source, MOVED));
+        let moved =
+            before.is_some_and(|before| !is_near(&before, &found.target_from_source, MOVED));
         if running.confirms {
             self.counts.confirmations += 1;
             self.counts.poses_withdrawn += u64::from(moved);

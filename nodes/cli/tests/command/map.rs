@@ -121,7 +121,10 @@ fn what_does_not_go_together_is_refused_in_a_line() {
         vec!["diff", &fcc, &hex],
     ] {
         let line = error(&[&["map"], &command[..]].concat());
-        assert!(line.contains(&hex) && line.contains("same lattice"), "{line}");
+        assert!(
+            line.contains(&hex) && line.contains("same lattice"),
+            "{line}"
+        );
     }
     let line = error(&["map", "merge", &fcc, &far, "-o", &out]);
     assert!(line.contains(&far) && line.contains("datum"), "{line}");
