@@ -111,8 +111,8 @@ fn middle(found: &Calibration, truth: &Isometry3<f64>, seen_m: &[Point3<f64>]) -
     [off.norm(), sigma_m, off.z].map(rounded)
 }
 
-/// An office with a desk whose board is as thick as a headset's mesh makes it: level surfaces are the desk's, the
-/// floor and the ceiling.
+/// An office with a table whose board is as thick as a headset's mesh makes it: level surfaces are the board's, the
+/// floor's and the ceiling's.
 fn office() -> Result<LabelledMesh, AnyError> {
     // Corner and size of each box, metres: walls are seen from inside.
     const BOXES: [([f32; 3], [f32; 3]); 5] = [
