@@ -42,7 +42,7 @@ const ABOUT: &[About] = about! {
     "time.unit": "auto, s, ms, us or ns.";
     "time.reference": "auto, stamp_start, stamp_end or absolute.";
     "time.max_span_s": "Longest time span of one cloud; a longer one indicates a wrong unit and is rejected, single outlying points are dropped.";
-    "time.offset_s": "Time added to those of all clouds, where their clock is not that of the poses: -18 if clouds are stamped in GPS time and poses in UTC.";
+    "time.offset_s" fixed(POSES): "Time added to those of all clouds, where their clock is not that of the poses: -18 if clouds are stamped in GPS time and poses in UTC.";
     "max_wait_s": "Longest wait of a cloud for a covering pose.";
     "max_pose_gap_s": "Longest gap between two poses for interpolation.";
     "pose_span_s" fixed(POSES): "Duration for which poses and dynamic mounts are kept.";

@@ -13,8 +13,6 @@ use super::ins::Body;
 use super::waiting::WaitingCloud;
 use crate::convert::cloud;
 
-/// Time on both sides of a point within which the velocity is measured, ns.
-const HALF_SPAN_NS: i64 = 10_000_000;
 /// Points of a cloud within this time share a pose, ns.
 const POSE_NS: i64 = 100_000;
 /// Least time between two poses of the way, ns, and the most of them: more than an hour.
@@ -97,7 +95,8 @@ impl LogSamples {
             sensor_m: mount.map_or_else(Vector3::zeros, |mount| {
                 mount.base_from_sensor.translation.vector
             }),
-            ..self.samples.clone()
+            poses: self.samples.poses.clone(),
+            way: self.samples.way.clone(),
         }
     }
 }
@@ -228,7 +227,7 @@ impl EnuTransformer {
             let bin = at_ns.div_euclid(POSE_NS);
             let found = places.entry(bin).or_insert_with(|| {
                 let middle_ns = bin * POSE_NS + POSE_NS / 2;
-                let pose = self.base_pose(middle_ns)?;
+                let pose = BasePose::at(middle_ns, |at_ns| self.map_from_base(at_ns).ok())?;
                 let mount = self.mount(&waiting.frame, middle_ns).ok()?;
                 samples.poses.push(pose);
                 Some((samples.poses.len() as u32 - 1, mount))
@@ -245,22 +244,6 @@ impl EnuTransformer {
         }
         samples.thin();
         Ok(())
-    }
-
-    /// Pose and motion of the base; `None` beyond the first and the last pose.
-    fn base_pose(&self, at_ns: i64) -> Option<BasePose> {
-        let map_from_base = self.map_from_base(at_ns).ok()?;
-        let before = self.map_from_base(at_ns - HALF_SPAN_NS).ok()?;
-        let after = self.map_from_base(at_ns + HALF_SPAN_NS).ok()?;
-        let span_s = 2e-9 * HALF_SPAN_NS as f64;
-        let turn = after.rotation * before.rotation.inverse();
-        let way = after.translation.vector - before.translation.vector;
-        Some(BasePose {
-            stamp_s: at_ns as f64 * 1e-9,
-            map_from_base,
-            velocity_m_per_s: way / span_s,
-            rate_rad_per_s: turn.scaled_axis() / span_s,
-        })
     }
 
     /// Mount at the stamp of a cloud, noted at the first one of its frame.

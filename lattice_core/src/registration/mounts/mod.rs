@@ -20,6 +20,7 @@ use nalgebra::{Isometry3, Vector3};
 use thiserror::Error;
 
 pub use correction::MountCorrection;
+pub use time_scan::MAX_DELAY_S;
 
 use crate::pose::StampedPose;
 use refine::Refined;
@@ -51,6 +52,31 @@ pub struct BasePose {
     pub velocity_m_per_s: Vector3<f64>,
     /// Turning rate in the map frame, rad/s.
     pub rate_rad_per_s: Vector3<f64>,
+}
+
+/// Time on both sides of a pose within which its motion is measured, nanoseconds.
+const HALF_SPAN_NS: i64 = 10_000_000;
+
+impl BasePose {
+    /// Pose and motion at a time in nanoseconds, from `map_from_base` at any time; `None` where that has no pose within
+    /// 10 ms before or after it.
+    pub fn at(
+        at_ns: i64,
+        map_from_base: impl Fn(i64) -> Option<Isometry3<f64>>,
+    ) -> Option<BasePose> {
+        let here = map_from_base(at_ns)?;
+        let before = map_from_base(at_ns.checked_sub(HALF_SPAN_NS)?)?;
+        let after = map_from_base(at_ns.checked_add(HALF_SPAN_NS)?)?;
+        let span_s = 2e-9 * HALF_SPAN_NS as f64;
+        let turn = after.rotation * before.rotation.inverse();
+        let way = after.translation.vector - before.translation.vector;
+        Some(BasePose {
+            stamp_s: at_ns as f64 * 1e-9,
+            map_from_base: here,
+            velocity_m_per_s: way / span_s,
+            rate_rad_per_s: turn.scaled_axis() / span_s,
+        })
+    }
 }
 
 /// Points of one sensor, each with the pose of the base at its time.

@@ -17,8 +17,8 @@ const RANGE_S: f64 = 40.0;
 const STEP_S: f64 = 0.1;
 /// Standard deviation of an offset of the scan alone, seconds.
 pub(super) const SIGMA_S: f64 = 0.5 * STEP_S;
-/// Range of offsets of one clock, seconds: delays of drivers.
-const NEAR_S: f64 = 1.0;
+/// Largest delay of a driver, seconds: a larger offset is that of another clock.
+pub const MAX_DELAY_S: f64 = 1.0;
 /// Time between a dip and the offsets that it is compared with, and behind them, in steps.
 const BESIDE: [usize; 2] = [5, 15];
 /// Time from a dip to others, seconds.
@@ -39,8 +39,6 @@ const MAX_POINTS: [usize; 2] = [10_000, 40_000];
 const POSE_NS: i64 = 10_000_000;
 /// Longest time between two poses that is interpolated, seconds.
 const MAX_GAP_S: f64 = 0.5;
-/// Time on both sides of a pose within which its velocity is measured, nanoseconds.
-const HALF_SPAN_NS: i64 = 10_000_000;
 
 /// Offset added to the times of points.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,15 +52,15 @@ pub(super) enum Offset {
 }
 
 /// Samples, prepared for any offset.
-struct Scan {
-    way: PoseBuffer,
+struct Scan<'a> {
+    way: &'a PoseBuffer,
     /// Times of the poses, nanoseconds.
     times_ns: Vec<i64>,
     points: Vec<(usize, Vector3<f64>)>,
 }
 
-impl Scan {
-    fn new(samples: &MountSamples, max_points: usize) -> Scan {
+impl<'a> Scan<'a> {
+    fn new(samples: &MountSamples, way: &'a PoseBuffer, max_points: usize) -> Scan<'a> {
         let stride = samples.points.len().div_ceil(max_points).max(1);
         let (mut places, mut times_ns) = (FxHashMap::default(), Vec::new());
         let mut points = Vec::new();
@@ -78,7 +76,7 @@ impl Scan {
             points.push((place, *point));
         }
         Scan {
-            way: way(samples),
+            way,
             times_ns,
             points,
         }
@@ -101,12 +99,12 @@ impl Scan {
         (used, cells.len())
     }
 
-    /// Voxels of each point at the multiples of a step; infinite where few points have a pose.
+    /// Voxels of each point at the multiples of a step; infinite where few points have a pose, or none a voxel.
     fn voxels(&self, steps: i32, step_s: f64, about_s: f64, cell_m: f64) -> Vec<f64> {
         let least = LEAST_PART * self.points.len() as f64;
         let counts = (-steps..=steps).into_par_iter().map(|step| {
             match self.count(about_s + f64::from(step) * step_s, cell_m) {
-                (used, voxels) if used > 0 && used as f64 >= least => voxels as f64 / used as f64,
+                (used, voxels) if voxels > 0 && used as f64 >= least => voxels as f64 / used as f64,
                 _ => f64::INFINITY,
             }
         });
@@ -142,7 +140,7 @@ impl Scan {
         if best < least_sigmas * sigma || best < least {
             return None;
         }
-        if best_s.abs() <= NEAR_S {
+        if best_s.abs() <= MAX_DELAY_S {
             return Some(best_s);
         }
         let other = depth(&|offset_s| (offset_s - best_s).abs() > APART_S);
@@ -161,15 +159,17 @@ pub(super) fn search(samples: &MountSamples) -> Offset {
     let fast = speeds.get(speeds.len() * 9 / 10).copied().unwrap_or(0.0);
     let cell_m = (fast * STEP_S).clamp(CELLS_M[0], CELLS_M[1]);
     let [few, most] = MAX_POINTS;
-    let scan = Scan::new(samples, most);
+    let way = way(samples);
+    let scan = Scan::new(samples, &way, most);
     let refined = |about_s: f64| scan.least(about_s, 5, 0.2 * STEP_S, 0.5 * cell_m);
     // Few points are enough where the stated times are right.
-    let is_near = |offset: &Option<f64>| offset.is_some_and(|offset_s| offset_s.abs() <= NEAR_S);
-    let quick = Some(Scan::new(samples, few).deepest(cell_m)).filter(is_near);
+    let is_near =
+        |offset: &Option<f64>| offset.is_some_and(|offset_s| offset_s.abs() <= MAX_DELAY_S);
+    let quick = Some(Scan::new(samples, &way, few).deepest(cell_m)).filter(is_near);
     match quick.unwrap_or_else(|| scan.deepest(cell_m)) {
         None => Offset::Nothing,
-        Some(offset_s) if offset_s.abs() <= NEAR_S => {
-            let near = (NEAR_S / STEP_S) as i32;
+        Some(offset_s) if offset_s.abs() <= MAX_DELAY_S => {
+            let near = (MAX_DELAY_S / STEP_S) as i32;
             Offset::Near(refined(scan.least(0.0, near, STEP_S, cell_m)))
         }
         Some(offset_s) => Offset::Far(refined(offset_s)),
@@ -209,7 +209,8 @@ pub(super) fn moved(samples: &MountSamples, offset_s: f64) -> [MountSamples; 2] 
     let [stated, moved] = &mut pair;
     let mut places = Vec::with_capacity(samples.poses.len());
     for pose in &samples.poses {
-        let found = base_pose(&way, ns(pose.stamp_s).saturating_add(ns(offset_s)));
+        let at_ns = ns(pose.stamp_s).saturating_add(ns(offset_s));
+        let found = BasePose::at(at_ns, |at_ns| way.at(at_ns).ok());
         places.push(found.map(|found| {
             let stamp_s = pose.stamp_s;
             stated.poses.push(*pose);
@@ -224,21 +225,6 @@ pub(super) fn moved(samples: &MountSamples, offset_s: f64) -> [MountSamples; 2] 
         }
     }
     pair
-}
-
-/// Pose and motion of the base; `None` beyond the first and the last pose.
-fn base_pose(way: &PoseBuffer, at_ns: i64) -> Option<BasePose> {
-    let map_from_base = way.at(at_ns).ok()?;
-    let before = way.at(at_ns.checked_sub(HALF_SPAN_NS)?).ok()?;
-    let after = way.at(at_ns.checked_add(HALF_SPAN_NS)?).ok()?;
-    let span_s = 2e-9 * HALF_SPAN_NS as f64;
-    let turn = after.rotation * before.rotation.inverse();
-    Some(BasePose {
-        stamp_s: at_ns as f64 * 1e-9,
-        map_from_base,
-        velocity_m_per_s: (after.translation.vector - before.translation.vector) / span_s,
-        rate_rad_per_s: turn.scaled_axis() / span_s,
-    })
 }
 
 fn way(samples: &MountSamples) -> PoseBuffer {

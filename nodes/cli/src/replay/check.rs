@@ -2,7 +2,7 @@
 
 use lattice_bag::BagReader;
 use lattice_core::registration::mounts::{
-    MountError, MountEstimate, MountNumber, MountOptions, estimate_mount,
+    MAX_DELAY_S, MountError, MountEstimate, MountNumber, MountOptions, estimate_mount,
 };
 use lattice_nodes::replay::{self, Slice, TopicPlan};
 
@@ -16,11 +16,10 @@ pub const CHECK_S: f64 = 60.0;
 pub const CHECK_POINTS: usize = 80_000;
 /// Most sensors that are checked one by one.
 const MAX_SENSORS: usize = 8;
-/// Offset of times beyond the delays of drivers, s: the map is wrong.
-const OTHER_CLOCK_S: f64 = 1.0;
-
+/// Least time offset that is called wrong, seconds.
+pub const WRONG_S: f64 = 0.005;
 /// Least corrections that are called wrong: degrees, metres and seconds.
-const WRONG: [f64; 3] = [0.3, 0.05, 0.005];
+const WRONG: [f64; 3] = [0.3, 0.05, WRONG_S];
 /// Standard deviations above which a correction is significant.
 const SIGNIFICANT: f64 = 3.0;
 
@@ -66,7 +65,7 @@ impl Better {
     fn of_offset(by_s: f64) -> Better {
         let way = if by_s > 0.0 { "later" } else { "earlier" };
         // A clock differs by whole seconds where it is known to tenths alone.
-        let shown_s = match (by_s - by_s.round()).abs() < 0.05 && by_s.abs() > OTHER_CLOCK_S {
+        let shown_s = match (by_s - by_s.round()).abs() < 0.05 && by_s.abs() > MAX_DELAY_S {
             true => by_s.round(),
             false => (by_s * 1e3).round() * 1e-3,
         };
@@ -132,10 +131,7 @@ impl Replay {
             .map(|mount| mount.topic.as_str())
             .collect();
         if let Some(better) = better {
-            if better
-                .offset_s
-                .is_some_and(|by_s| by_s.abs() > OTHER_CLOCK_S)
-            {
+            if better.offset_s.is_some_and(|by_s| by_s.abs() > MAX_DELAY_S) {
                 return Err(format!(
                     "the clocks of clouds and poses differ: clouds fit {} (no map was written; --trust-stamps writes it)",
                     better.text

@@ -16,7 +16,7 @@ use lattice_core::voxels::file::WriteOptions;
 use super::cell_size::CellSize;
 use super::progress::Progress;
 use super::{CliResult, Lattices, fleet, init_logging};
-pub use check::{Better, CHECK_POINTS, CHECK_S};
+pub use check::{Better, CHECK_POINTS, CHECK_S, WRONG_S};
 use lattice_bag::BagReader;
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::enu_transformer::ins::InsSource;

@@ -64,17 +64,18 @@ fn write(log: &Path, convention: AttitudeConvention) {
     writer.finish().unwrap();
 }
 
-/// Exit status, errors, and the map of a replay, if it was written.
-fn replay(log: &Path, options: &[&str]) -> (i32, String, Option<MapContents>) {
+/// Exit status, all that was printed, and the map of a replay, if it was written.
+pub fn replay(log: &Path, options: &[&str]) -> (i32, String, Option<MapContents>) {
     let map = log.with_extension("lattice");
     let _ = std::fs::remove_file(&map);
     let [log, out] = [log, &map].map(|path| path.display().to_string());
     let arguments = ["replay", &log, "--direct", "--map-out", &out];
     let output = lattice(&[&arguments[..], options].concat());
-    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let printed = text(&output.stdout) + &text(&output.stderr);
     let map = std::fs::read(&map).ok();
     let map = map.map(|bytes| MapContents::read(&bytes[..], usize::MAX).unwrap());
-    (output.status.code().unwrap(), errors, map)
+    (output.status.code().unwrap(), printed, map)
 }
 
 #[test]

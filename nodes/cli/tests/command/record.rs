@@ -4,6 +4,7 @@ use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
 
 use lattice_bag::BagReader;
 use lattice_runtime::LoopbackDomain;
@@ -46,15 +47,15 @@ pub fn spawn(domain: &LoopbackDomain, command: &mut Command) -> Child {
         .unwrap()
 }
 
-/// Reads the log of a process until it has said all of these; the rest is read and forgotten.
-pub fn expect(process: &mut Child, wanted: &[&str]) {
+/// Reads the log of a process until it has said all of these; the thread returns the rest.
+pub fn expect(process: &mut Child, wanted: &[&str]) -> JoinHandle<Vec<String>> {
     let mut wanted = wanted.to_vec();
     let mut lines = BufReader::new(process.stderr.take().unwrap()).lines();
     while !wanted.is_empty() {
         let line = lines.next().unwrap().unwrap();
         wanted.retain(|text| !line.contains(text));
     }
-    std::thread::spawn(move || lines.for_each(drop));
+    std::thread::spawn(move || lines.map_while(Result::ok).collect())
 }
 
 pub fn signal(process: &Child, signal: &str) {

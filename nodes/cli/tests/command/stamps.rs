@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use lattice_bag::{BagReader, BagWriter, ReadOptions, Storage, TopicSpec, WriterOptions};
-use lattice_core::voxels::file::MapContents;
 use lattice_msgs::RosMessage;
 use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::cdr;
@@ -12,6 +11,7 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_nodes::convert::geometry;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
 
+use crate::attitude::replay;
 use crate::lattice;
 
 /// Every fourth point of a drive through a hall, with its true poses on `/odom`.
@@ -104,20 +104,6 @@ fn with_clock(log: &Path, name: &str, offset_s: i64, is_sorted: bool) -> PathBuf
     }
     write(&copy, messages);
     copy
-}
-
-/// Exit status, all that was printed, and the map of a replay, if it was written.
-fn replay(log: &Path, options: &[&str]) -> (i32, String, Option<MapContents>) {
-    let map = log.with_extension("lattice");
-    let _ = std::fs::remove_file(&map);
-    let [log, out] = [log, &map].map(|path| path.display().to_string());
-    let arguments = ["replay", &log, "--direct", "--map-out", &out];
-    let output = lattice(&[&arguments[..], options].concat());
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    let printed = text(&output.stdout) + &text(&output.stderr);
-    let map = std::fs::read(&map).ok();
-    let map = map.map(|bytes| MapContents::read(&bytes[..], usize::MAX).unwrap());
-    (output.status.code().unwrap(), printed, map)
 }
 
 #[test]

@@ -7,8 +7,7 @@ use lattice_nodes::enu_transformer::{LogSamples, StatedMount};
 use nalgebra::Isometry3;
 use serde::Serialize;
 
-/// Least time offset that is shown as a parameter, seconds.
-const WRONG_S: f64 = 0.005;
+use crate::replay::WRONG_S;
 
 /// Result of a calibration of mounts.
 #[derive(Serialize)]

@@ -23,6 +23,7 @@ use super::views::any_pose;
 use crate::AnyError;
 use crate::mesh::LabelledMesh;
 use crate::random::Stream;
+use crate::simulate::house::Builder;
 use room::{CELL_SIDE_M, Room};
 
 /// Heights of the robot's sensor above the floor, metres.
@@ -114,41 +115,15 @@ fn middle(found: &Calibration, truth: &Isometry3<f64>, seen_m: &[Point3<f64>]) -
 /// An office with a table whose board is as thick as a headset's mesh makes it: level surfaces are the board's, the
 /// floor's and the ceiling's.
 fn office() -> Result<LabelledMesh, AnyError> {
-    // Corner and size of each box, metres: walls are seen from inside.
-    const BOXES: [([f32; 3], [f32; 3]); 5] = [
-        ([0.0, 0.0, 0.0], [2.4, 2.5, 2.8]),
-        ([0.0, 0.0, 0.62], [1.4, 0.7, 0.1]),
-        ([0.05, 0.05, 0.0], [0.06, 0.6, 0.62]),
-        ([1.3, 0.05, 0.0], [0.06, 0.6, 0.62]),
-        ([2.1, 1.9, 0.0], [0.3, 0.6, 2.8]),
-    ];
-    const SIDES: [[usize; 4]; 6] = [
-        [0, 1, 3, 2],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 3, 7, 6],
-        [0, 2, 6, 4],
-        [1, 3, 7, 5],
-    ];
-    let (mut vertices_m, mut triangles) = (Vec::new(), Vec::new());
-    for ([x, y, z], [a, b, c]) in BOXES {
-        let first = vertices_m.len();
-        vertices_m.extend((0..8_u8).map(|i| {
-            let [i, j, k] = [i & 1, i >> 1 & 1, i >> 2].map(f32::from);
-            [x + i * a, y + j * b, z + k * c]
-        }));
-        for side in SIDES {
-            let [a, b, c, d] = side.map(|corner| (first + corner) as u32);
-            triangles.extend([[a, b, c], [a, c, d]]);
-        }
-    }
-    let none = vec![0; triangles.len()];
-    Ok(LabelledMesh::new(
-        vertices_m,
-        triangles,
-        none.clone(),
-        none,
-    )?)
+    let mut office = Builder::default();
+    // Lowest and highest corners, metres. Walls are seen from inside.
+    office
+        .block([0.0; 3], [2.4, 2.5, 2.8])
+        .block([0.0, 0.0, 0.62], [1.4, 0.7, 0.72])
+        .block([0.05, 0.05, 0.0], [0.11, 0.65, 0.62])
+        .block([1.3, 0.05, 0.0], [1.36, 0.65, 0.62])
+        .block([2.1, 1.9, 0.0], [2.4, 2.5, 2.8]);
+    office.build()
 }
 
 #[cfg(test)]

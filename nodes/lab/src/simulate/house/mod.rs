@@ -14,6 +14,7 @@ mod building;
 mod camera;
 mod free_space;
 mod generated;
+pub(crate) use generated::Builder;
 mod headset;
 mod headset_mesh;
 mod images;

@@ -17,7 +17,7 @@ pub(super) struct Spot {
 
 /// A mesh as it grows; metres.
 #[derive(Default)]
-pub(super) struct Builder {
+pub struct Builder {
     vertices_m: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
     labels: Vec<u16>,
@@ -41,8 +41,8 @@ impl Builder {
         self.thing(label, Spot::default())
     }
 
-    /// A box from its lowest to its highest corner.
-    pub(super) fn block(&mut self, low: [f32; 3], high: [f32; 3]) -> &mut Builder {
+    /// Adds a box from its lowest to its highest corner.
+    pub fn block(&mut self, low: [f32; 3], high: [f32; 3]) -> &mut Builder {
         let first = self.vertices_m.len() as u32;
         for corner in 0..8 {
             let of = |axis: usize| [low, high][corner >> axis & 1][axis];
@@ -96,7 +96,8 @@ impl Builder {
         self.instances.push(self.instance);
     }
 
-    pub(super) fn build(self) -> Result<LabelledMesh, AnyError> {
+    /// Finishes the mesh.
+    pub fn build(self) -> Result<LabelledMesh, AnyError> {
         let mesh = LabelledMesh::new(self.vertices_m, self.triangles, self.labels, self.instances)?;
         Ok(mesh)
     }

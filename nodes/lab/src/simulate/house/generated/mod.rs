@@ -9,7 +9,8 @@ mod walls;
 use super::House;
 use crate::AnyError;
 use crate::simulate::random::{Purpose, Stream};
-use builder::{Builder, Spot};
+pub use builder::Builder;
+use builder::Spot;
 use std::collections::BTreeMap;
 
 /// The classes, by number.
