@@ -199,7 +199,7 @@ impl Default for ActionLimits {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lattice_msgs::calibration::{CalibrateAction, CalibrateResult};
+    use lattice_msgs::lattice::{CalibrateAction, CalibrateResult};
 
     type Here = Goals<CalibrateAction, &'static str>;
 

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicI64;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
-use lattice_msgs::{RosMessage, RosService};
+use lattice_msgs::{RosMessage, RosService, know_service};
 use smol::channel::bounded;
 use smol::future::or;
 use smol::{Task, Timer};
@@ -170,6 +170,7 @@ impl Inner {
 impl Shared {
     /// Creates a client of `S` under a full name.
     pub(crate) fn client<S: RosService>(self: &Arc<Self>, node: NodeId, name: String) -> Client {
+        know_service::<S>();
         Client(Arc::new(Inner {
             shared: Arc::downgrade(self),
             node,

@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 use std::sync::{Arc, Mutex};
 
-use lattice_msgs::RosMessage;
+use lattice_msgs::{RosMessage, know_message};
 
 use super::Shared;
 use crate::error::RuntimeError;
@@ -25,6 +25,7 @@ impl Shared {
         qos: &Qos,
         when_full: WhenFull,
     ) -> Result<Publisher<M>, RuntimeError> {
+        know_message::<M>();
         let of = (M::TYPE, None);
         let parts = self.publisher_parts(node, topic, of, qos, when_full, |peers| {
             let topic = self.bus.topic(topic);

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
-use lattice_msgs::{RosMessage, RosService};
+use lattice_msgs::{RosMessage, RosService, know_service};
 use smol::channel::bounded;
 
 use super::{Shared, closed};
@@ -40,6 +40,7 @@ impl Shared {
     ) -> Result<Server, RuntimeError> {
         let clients = Arc::new(Peers::new(name, "client", log::Level::Debug));
         let readers = Arc::new(Peers::new(name, "reply reader", log::Level::Debug));
+        know_service::<S>();
         let service = PortService {
             node: &self.graph.node(node),
             name,

@@ -5,7 +5,7 @@ use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
-use lattice_msgs::RosMessage;
+use lattice_msgs::{RosMessage, know_message};
 use smol::channel::{Sender, bounded, unbounded};
 
 use super::status::MAX_LOSSES;
@@ -48,6 +48,7 @@ impl Shared {
         max_bytes: usize,
         handler: impl FnMut(Sample<'_, M>, &Arc<Stats>) + Send + 'static,
     ) -> Result<Subscription, RuntimeError> {
+        know_message::<M>();
         let join: Join = |topic, peers, sender, lost, latched| {
             topic
                 .join_subscriber::<M>(peers, sender, lost, latched)
