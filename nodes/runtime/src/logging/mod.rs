@@ -9,7 +9,7 @@ mod throttle;
 pub(crate) use levels::{level, set_level};
 pub use throttle::Throttle;
 
-use crate::ros_args::RosArgs;
+use crate::config::ros_args::RosArgs;
 use crate::sync::lock;
 use env_logger::Logger;
 use file::LogFile;
