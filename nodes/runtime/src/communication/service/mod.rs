@@ -2,6 +2,7 @@
 
 mod local;
 mod remote_calls;
+mod reply;
 mod serving;
 mod wire;
 
@@ -9,17 +10,18 @@ pub(crate) use local::{LocalCall, LocalServices};
 pub(crate) use remote_calls::{PendingCalls, RemoteCalls};
 pub(crate) use serving::Serving;
 
-use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Instant;
 
 use smol::Task;
-use smol::channel::{Receiver, Sender, bounded};
+use smol::channel::{Sender, bounded};
 
 use crate::graph::local_graph::NodeEndpoint;
 use crate::sync::{lock, wait_for};
 use crate::transport::outbox::Outbox;
 use crate::transport::peers::Peers;
+pub use reply::Reply;
+pub(crate) use reply::Unanswered;
 
 /// A service server; dropping it ends it.
 #[must_use = "dropping a server ends it"]
@@ -35,38 +37,6 @@ impl Server {
     /// Full name of the service.
     pub fn name(&self) -> &str {
         &self.name
-    }
-}
-
-/// Requests without reply: the wire protocol has no rejection, so they are counted here.
-pub(crate) struct Unanswered {
-    pub name: String,
-    /// Overwritten by newer requests before they were taken.
-    pub lost: AtomicU64,
-    /// Taken, but not decodable or without reply.
-    pub failed: AtomicU64,
-}
-
-/// Replies to one request, from any thread. Of its clones, the first to send is used.
-pub struct Reply<R>(Sender<R>);
-
-impl<R> Clone for Reply<R> {
-    fn clone(&self) -> Self {
-        Self(self.0.clone())
-    }
-}
-
-impl<R> Reply<R> {
-    /// Sends the reply. A request whose reply is dropped remains without reply.
-    pub fn send(self, response: R) {
-        // The server may have ended.
-        let _ = self.0.try_send(response);
-    }
-
-    /// Creates a reply that goes to a receiver instead of a client.
-    pub fn channel() -> (Self, Receiver<R>) {
-        let (sender, receiver) = bounded(1);
-        (Self(sender), receiver)
     }
 }
 

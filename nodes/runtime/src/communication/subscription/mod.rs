@@ -1,31 +1,25 @@
 //! Subscriptions: their handles, counters and messages.
 
 mod intake;
+mod sample;
 mod source;
 
 pub(crate) use intake::Intake;
 pub(crate) use source::Source;
 
-use std::convert::Infallible;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::Duration;
 
 use lattice_msgs::{RosMessage, cdr};
 use smol::Task;
 use smol::channel::{Sender, bounded};
 
 use crate::error::RuntimeError;
-use crate::logging::Throttle;
 use crate::shutdown::Shutdown;
 use crate::sync::lock;
 use crate::task_thread::run_catching_panics;
-use crate::transport::peers::Peers;
-use crate::transport::port::ReaderLosses;
-
-/// Period of warnings about undecodable samples.
-const WARNING_PERIOD: Duration = Duration::from_secs(5);
+pub(crate) use sample::{Sample, Stats};
 
 /// Thread that executes the handler of a subscription.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,16 +42,6 @@ pub(crate) enum Running {
     OnIoThread { _task: Task<()> },
     /// Ends when the sender is dropped.
     OnOwnThread { _stop: Sender<()> },
-}
-
-/// Counters of a subscription.
-pub(crate) struct Stats {
-    peers: Arc<Peers>,
-    received: AtomicU64,
-    pub undecodable: AtomicU64,
-    /// Lost messages, those of this process included.
-    pub losses: ReaderLosses,
-    warning: Throttle,
 }
 
 impl Subscription {
@@ -142,68 +126,6 @@ impl Losses {
     fn sum(&self, of: impl Fn(&Stats) -> u64) -> u64 {
         lock(&self.0).iter().map(|stats| of(stats)).sum()
     }
-}
-
-impl Stats {
-    pub(crate) fn new(peers: Arc<Peers>, losses: ReaderLosses) -> Self {
-        Self {
-            peers,
-            received: AtomicU64::new(0),
-            undecodable: AtomicU64::new(0),
-            losses,
-            warning: Throttle::new(WARNING_PERIOD),
-        }
-    }
-
-    fn lost(&self) -> u64 {
-        let ReaderLosses {
-            on_network,
-            overrun,
-        } = &self.losses;
-        on_network
-            .load(Relaxed)
-            .saturating_add(overrun.load(Relaxed))
-    }
-
-    /// Decodes a sample and counts the outcome.
-    pub(crate) fn decode<M: RosMessage>(&self, sample: Sample<'_, M>) -> Option<Arc<M>> {
-        let message = match sample {
-            Sample::Shared(message) => Some(message),
-            Sample::Cdr(bytes) => cdr::from_slice::<M>(bytes)
-                .inspect_err(|why| self.not_decodable(why))
-                .ok()
-                .map(Arc::new),
-        };
-        if message.is_some() {
-            self.received.fetch_add(1, Relaxed);
-        }
-        message
-    }
-
-    /// Takes the bytes of a sample without decoding.
-    pub(crate) fn take_bytes(&self, sample: Sample<'_, Infallible>) -> Vec<u8> {
-        self.received.fetch_add(1, Relaxed);
-        match sample {
-            Sample::Shared(never) => match *never {},
-            Sample::Cdr(bytes) => std::mem::take(bytes),
-        }
-    }
-
-    fn not_decodable(&self, why: &dyn std::fmt::Display) {
-        let count = self.undecodable.fetch_add(1, Relaxed).saturating_add(1);
-        if self.warning.check().is_some() {
-            let topic = self.peers.topic();
-            log::warn!("{topic}: undecodable sample ({count} so far): {why}");
-        }
-    }
-}
-
-/// A message before decoding.
-pub(crate) enum Sample<'a, M> {
-    /// From this process.
-    Shared(Arc<M>),
-    /// From another process, encapsulation header first. The buffer may be taken.
-    Cdr(&'a mut Vec<u8>),
 }
 
 /// A message to be decoded on another thread than the receiving one.

@@ -1,4 +1,8 @@
+use super::validate::NAMESPACE_LENGTH_MAX;
+use super::validate::NODE_NAME_LENGTH_MAX;
+use super::validate::TOPIC_LENGTH_MAX;
 use super::*;
+
 use proptest::prelude::*;
 
 /// The full name of a topic of `mapper` after rules separated by blanks.

@@ -1,31 +1,12 @@
 //! Changes of parameters while the node runs, by the rules of rclcpp (`node_parameters.cpp`).
 
-use std::collections::BTreeMap;
-
-use super::{Given, Origin, ParamValue, Params, Range, State};
+use super::ParamValue;
+use super::about::Range;
+use super::state::{Changes, Given, Origin, Params, State, Values};
 use crate::sync::lock;
 
 /// Longest accepted value, characters or items.
 const MAX_VALUE_LENGTH: usize = 1 << 16;
-
-/// Validates all candidate values, or returns the reason against them; then nothing changes.
-type Apply = Box<dyn FnMut(&Params) -> Result<(), String> + Send>;
-
-/// Receives new and changed parameters.
-type Listener = Box<dyn FnMut(Values, Values) + Send>;
-
-/// Parameters by name.
-pub(crate) type Values = BTreeMap<String, ParamValue>;
-
-/// Participants of a parameter change; one change at a time.
-#[derive(Default)]
-pub(super) struct Changes {
-    /// Callback of the node; `None`: it is not running.
-    node: Option<Apply>,
-    apply: Vec<Apply>,
-    is_open: bool,
-    listener: Option<Listener>,
-}
 
 /// Reason for rejecting a change.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]

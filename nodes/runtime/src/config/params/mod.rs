@@ -3,9 +3,11 @@
 
 mod about;
 mod change;
+mod describe;
 mod error;
 mod ranges;
 mod sections;
+mod state;
 mod unknown;
 
 pub use crate::config::param_value::{ParamValue, ValueError};
@@ -16,48 +18,14 @@ pub use sections::{Addressed, addressed};
 pub use unknown::{Unknown, is_near, nearest};
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::path::Path;
 
-use self::change::Changes;
 use crate::config::names;
 use crate::config::params_file::{self, NodePattern};
 use crate::config::ros_args::RosArgs;
 use crate::sync::lock;
-
-/// Parameters of one node.
-///
-/// Reading a parameter declares it; [`Params::open`] allows changes by services.
-#[derive(Default)]
-pub struct Params {
-    node: String,
-    state: Mutex<State>,
-    changes: Mutex<Changes>,
-}
-
-#[derive(Clone, Default)]
-struct State {
-    given: BTreeMap<String, Given>,
-    declared: BTreeMap<String, Declared>,
-    about: Vec<&'static [About]>,
-}
-
-/// A value with its origin.
-#[derive(Clone, Debug)]
-struct Given {
-    value: ParamValue,
-    origin: Origin,
-    /// True if it addresses this node by name; false if it addresses all nodes of the file or the arguments.
-    named: bool,
-}
-
-#[derive(Clone, Debug)]
-enum Origin {
-    Default,
-    CommandLine,
-    Service,
-    File { path: PathBuf, key: String },
-}
+pub use state::Params;
+use state::{Given, Origin, State};
 
 impl std::fmt::Display for Origin {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

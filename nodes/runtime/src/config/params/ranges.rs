@@ -3,7 +3,9 @@
 use std::fmt::Debug;
 use std::ops::RangeInclusive;
 
-use super::{Declared, ParamError, Params, Range};
+use super::about::{Declared, Range};
+use super::error::ParamError;
+use super::state::Params;
 use crate::sync::lock;
 
 impl Params {

@@ -9,7 +9,8 @@
 //! | any other | unknown |
 
 use super::about::OF_EVERY_NODE;
-use super::{Given, Origin, ParamError, Params};
+use super::error::ParamError;
+use super::state::{Given, Origin, Params};
 use crate::sync::lock;
 
 /// Prefixes of names that rclcpp and its helpers declare in any node.

@@ -6,6 +6,8 @@ use log::LevelFilter;
 use proptest::prelude::*;
 
 use super::*;
+use crate::config::names::RemapRule;
+
 use crate::config::names::NameKind;
 use crate::config::param_value::ParamValue;
 

@@ -16,14 +16,13 @@ use lattice_msgs::rcl_interfaces::{
 };
 
 use self::convert::{descriptor, messages, value_message};
+use self::set::MAX_NAMES;
 use super::logical_node::Node;
 use crate::communication::service::Server;
 use crate::config::params::{ParamValue, Params};
 use crate::error::RuntimeError;
 use crate::transport::qos::Qos;
 
-/// Limit of names or parameters per request; a larger request gets an empty reply.
-const MAX_NAMES: usize = 1000;
 /// Limit of array items plus string bytes per reply.
 const MAX_ANSWER_LENGTH: usize = 1 << 20;
 

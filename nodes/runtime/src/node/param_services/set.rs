@@ -11,12 +11,14 @@ use lattice_msgs::rcl_interfaces::{
     SetParametersResponse, SetParametersResult,
 };
 
-use super::MAX_NAMES;
 use super::convert::value_from;
 use crate::communication::service::Server;
 use crate::config::params::{ParamValue, Params, Refusal};
 use crate::error::RuntimeError;
 use crate::node::logical_node::Node;
+
+/// Limit of names or parameters per request; a larger request gets an empty reply.
+pub(super) const MAX_NAMES: usize = 1000;
 
 /// Serves `set_parameters`: each parameter is set individually.
 pub(super) fn serve_each(node: &Node, params: &Arc<Params>) -> Result<Server, RuntimeError> {

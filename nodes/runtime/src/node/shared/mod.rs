@@ -3,28 +3,24 @@
 mod calling;
 mod listening;
 mod publishing;
+mod receive_buffer;
 mod serving;
+mod state;
 mod status;
 mod subscribing;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, Weak};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use lattice_msgs::rosgraph_msgs;
-use smol::Task;
-use smol::channel::Sender;
 
 pub use self::calling::{CallError, Client};
-use self::status::ReceiveBuffer;
-use super::diagnostics::Tasks;
+use self::receive_buffer::ReceiveBuffer;
 use crate::communication::publisher::PublisherParts;
 use crate::communication::service::{Answers, LocalServices, Server, Unanswered};
-use crate::communication::subscription::{
-    Intake, Sample, Stats, Subscription, SubscriptionExecutor,
-};
+use crate::communication::subscription::{Intake, Sample, Stats, SubscriptionExecutor};
 use crate::config::env::{Network, TransportKind};
 use crate::config::security::Enclave;
 use crate::error::RuntimeError;
@@ -41,6 +37,8 @@ use crate::transport::qos::{Qos, Reliability};
 use crate::transport::remote::RemotePublisher;
 #[cfg(feature = "zenoh")]
 use crate::transport::rmw_zenoh::Zenoh;
+pub(crate) use state::Shared;
+use state::{Open, closed};
 
 /// Queue length of one publisher, messages.
 const QUEUE_MESSAGES: usize = 1024;
@@ -54,40 +52,6 @@ const DRAIN_TIME: Duration = Duration::from_millis(900);
 
 /// Default limit of message length, bytes.
 pub(crate) const DEFAULT_MAX_MESSAGE_BYTES: usize = 64 << 20;
-
-/// The participant, threads and local bus of a process.
-pub(crate) struct Shared {
-    pub bus: LocalBus,
-    pub shutdown: Shutdown,
-    pub io: TaskThread,
-    pub tasks: Arc<Tasks>,
-    pub receive_buffer: ReceiveBuffer,
-    /// Largest count of each loss so far.
-    losses: Mutex<BTreeMap<String, u64>>,
-    /// Simulated time, shared by all nodes of a process.
-    sim_time: Mutex<Option<(Arc<AtomicI64>, Subscription)>>,
-    publishing: TaskThread,
-    answers: Answers,
-    services: LocalServices,
-    endpoints: Arc<Endpoints>,
-    pub graph: Arc<Graph>,
-    open: Mutex<Option<Open>>,
-}
-
-/// State released at shutdown.
-struct Open {
-    transport: Arc<dyn Transport>,
-    _watch: Option<Task<()>>,
-    publishers: Vec<Weak<PublisherParts>>,
-    intakes: Vec<Weak<Intake>>,
-    /// Topics and counters of subscriptions, ended ones included.
-    subscribed: VecDeque<(String, Arc<Stats>)>,
-    readers: Vec<(Sender<()>, JoinHandle<()>)>,
-    servers: Vec<Server>,
-    unanswered: Vec<Weak<Unanswered>>,
-    graph: Option<(Task<()>, Arc<Outbox>)>,
-    graph_of_others: Option<Task<()>>,
-}
 
 impl Shared {
     pub(crate) fn start(network: &Network, enclave: &Enclave) -> Result<Arc<Self>, RuntimeError> {
@@ -358,11 +322,5 @@ pub(crate) fn deadline() -> Instant {
 impl Drop for Shared {
     fn drop(&mut self) {
         self.close();
-    }
-}
-
-fn closed(topic: &str) -> RuntimeError {
-    RuntimeError::Closed {
-        topic: topic.to_owned(),
     }
 }

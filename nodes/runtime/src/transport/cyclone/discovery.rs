@@ -2,18 +2,17 @@
 
 use std::borrow::Cow;
 use std::ffi::{CStr, c_char, c_void};
-use std::mem::MaybeUninit;
 use std::ptr;
 use std::sync::{Arc, Mutex, Weak};
 
 use lattice_cyclone_sys::{
-    DDS_ALIVE_INSTANCE_STATE, DDS_ANY_STATE, DDS_BUILTIN_TOPIC_DCPSPUBLICATION,
-    DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, dds_builtintopic_endpoint_t, dds_create_listener,
-    dds_create_reader, dds_delete_listener, dds_entity_t, dds_lset_data_available_arg,
-    dds_return_loan, dds_sample_info_t, dds_take_mask,
+    DDS_BUILTIN_TOPIC_DCPSPUBLICATION, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION,
+    dds_builtintopic_endpoint_t, dds_create_listener, dds_create_reader, dds_delete_listener,
+    dds_entity_t, dds_lset_data_available_arg,
 };
 use smol::channel::Sender;
 
+pub(super) use super::builtin_topic::take_all;
 use super::endpoint::{Description, Endpoint, Side};
 use super::entity::{Entity, endpoint_id};
 use super::names::role;
@@ -23,9 +22,6 @@ use crate::sync::lock;
 use crate::transport::port::{DURABILITY_CONFLICT, EndpointId, PortEvent, RELIABILITY_CONFLICT};
 use crate::transport::qos::{Durability, Reliability};
 use crate::transport::remote::{Announced, GraphRole, RemotePublisher, announced_hash};
-
-/// Endpoints taken per call.
-const BATCH: usize = 64;
 
 /// Local endpoints, and readers of Cyclone's built-in topics that check remote endpoints against them.
 pub(super) struct Discovery {
@@ -238,31 +234,6 @@ impl Drop for Discovery {
     fn drop(&mut self) {
         // Listeners use the other fields.
         lock(&self.readers).clear();
-    }
-}
-
-/// Takes all samples of a built-in topic. Passes each to `each` with true if its instance is alive.
-pub(super) fn take_all(reader: dds_entity_t, each: &mut dyn FnMut(*const c_void, bool)) {
-    loop {
-        let mut found = [ptr::null_mut::<c_void>(); BATCH];
-        let mut infos = [MaybeUninit::<dds_sample_info_t>::uninit(); BATCH];
-        let places = (found.as_mut_ptr(), infos.as_mut_ptr().cast());
-        // SAFETY: space for a batch; a null first element requests a loan.
-        let count = unsafe {
-            let most = BATCH as u32;
-            dds_take_mask(reader, places.0, places.1, BATCH, most, DDS_ANY_STATE)
-        };
-        let taken = usize::try_from(count).unwrap_or(0).min(BATCH);
-        for (sample, info) in found.iter().zip(&infos).take(taken) {
-            // SAFETY: `count` elements are initialized.
-            let state = unsafe { info.assume_init_ref() }.instance_state;
-            each(sample.cast_const(), state == DDS_ALIVE_INSTANCE_STATE);
-        }
-        if taken == 0 {
-            return;
-        }
-        // SAFETY: returns the loan of the call above.
-        let _ = unsafe { dds_return_loan(reader, found.as_mut_ptr(), count) };
     }
 }
 

@@ -3,6 +3,7 @@
 //!
 //! Topics may have any type name; samples are serialized bytes.
 
+mod builtin_topic;
 mod config;
 mod discovery;
 mod domain;

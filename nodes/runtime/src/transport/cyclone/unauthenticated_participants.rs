@@ -13,7 +13,7 @@ use lattice_cyclone_sys::{
 };
 use log::Level;
 
-use super::discovery::take_all;
+use super::builtin_topic::take_all;
 use super::entity::{Entity, endpoint_id};
 use super::log::tell;
 use crate::sync::lock;

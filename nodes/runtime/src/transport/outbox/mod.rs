@@ -4,20 +4,19 @@
 //! a blocked writer delays its own queue only.
 
 mod budget;
+mod queue;
 mod state;
 #[cfg(test)]
 mod tests;
 
 use std::cell::Cell;
-use std::sync::atomic::Ordering::{Relaxed, Release};
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use futures::future::{Either, select};
-use lattice_msgs::cdr::CdrError;
 use smol::Timer;
-use smol::channel::{Receiver, Sender, TrySendError, bounded};
+use smol::channel::{Receiver, TrySendError, bounded};
 use smol::future::{or, yield_now};
 
 use self::budget::Budget;
@@ -25,72 +24,12 @@ use crate::error::PublishError;
 use crate::logging::Throttle;
 use crate::shutdown::Shutdown;
 use crate::sync::lock;
-use crate::transport::port::{
-    Bytes, ENCAPSULATION_BYTES, EndpointId, SampleId, SampleWriter, WriteRefusal,
-};
-
-/// Longest wait of a sample for a full send window before it is dropped.
-const PATIENCE: Duration = Duration::from_secs(1);
-
-/// Longest wait after a sample was dropped: a stalled peer must not slow down the others.
-const PATIENCE_WITH_STUCK_PEER: Duration = Duration::from_millis(20);
+use crate::transport::port::{Bytes, EndpointId, SampleId, SampleWriter};
+use queue::{Content, Job, Shared, WARNING_PERIOD};
+pub(crate) use queue::{Outbox, Serialize, WhenFull};
 
 /// Consecutive samples of a queue before its task yields to others of the thread.
 const JOBS_PER_TURN: u32 = 16;
-
-/// Period of warnings about dropped messages.
-const WARNING_PERIOD: Duration = Duration::from_secs(5);
-
-/// Policy for a full send window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum WhenFull {
-    /// Drop and count the sample after a short wait.
-    Drop,
-    /// Wait without a limit.
-    Wait,
-}
-
-/// Serializes a sample, encapsulation header included, on the publisher thread.
-pub(crate) type Serialize = Box<dyn FnOnce() -> Result<Vec<u8>, CdrError> + Send>;
-
-enum Job {
-    Sample {
-        content: Content,
-        reserved: usize,
-        related: Option<SampleId>,
-    },
-    /// Replied to when everything before it has been passed to DDS.
-    Flush(Sender<()>),
-}
-
-enum Content {
-    Body(Bytes),
-    Later(Serialize),
-}
-
-/// Queue of one writer, as seen by its caller.
-pub(crate) struct Outbox {
-    id: EndpointId,
-    jobs: Sender<Job>,
-    shared: Arc<Shared>,
-}
-
-/// State shared by both ends.
-struct Shared {
-    topic: String,
-    // Removed at shutdown, when handles of the publisher may still exist.
-    writer: Mutex<Option<Arc<dyn SampleWriter>>>,
-    budget: Budget,
-    when_full: WhenFull,
-    last_bytes: AtomicUsize,
-    /// Samples in the queue, including the one being written.
-    waiting: AtomicUsize,
-    dropped: AtomicU64,
-    sent: AtomicU64,
-    sent_bytes: AtomicU64,
-    stuck: AtomicBool,
-    warning: Throttle,
-}
 
 impl Outbox {
     /// Creates the queue and the task for the publisher thread.
@@ -260,88 +199,6 @@ impl Outbox {
     fn closed(&self) -> PublishError {
         PublishError::Closed {
             topic: self.shared.topic.clone(),
-        }
-    }
-}
-
-impl Shared {
-    fn writer(&self) -> Option<Arc<dyn SampleWriter>> {
-        lock(&self.writer).clone()
-    }
-
-    /// Removes a sample, sent or not, from the accounting.
-    fn done(&self, reserved: usize) {
-        self.waiting.fetch_sub(1, Release);
-        self.budget.give_back(reserved);
-    }
-
-    fn drop_one(&self, why: &str) {
-        let dropped = self.dropped.fetch_add(1, Relaxed).saturating_add(1);
-        if self.warning.check().is_some() {
-            log::warn!("{}: message dropped ({dropped} so far): {why}", self.topic);
-        }
-    }
-
-    fn count_sent(&self, body: &Bytes) {
-        self.sent.fetch_add(1, Relaxed);
-        self.sent_bytes.fetch_add(body.len() as u64, Relaxed);
-    }
-
-    fn body(&self, content: Content) -> Option<Bytes> {
-        match content {
-            Content::Body(body) => Some(body),
-            Content::Later(serialize) => match serialize() {
-                Ok(bytes) => {
-                    self.last_bytes.store(bytes.len(), Relaxed);
-                    let mut body = Bytes::from(bytes);
-                    Some(body.split_off(ENCAPSULATION_BYTES.min(body.len())))
-                }
-                Err(error) => {
-                    self.drop_one(&error.to_string());
-                    None
-                }
-            },
-        }
-    }
-
-    async fn write(&self, body: Bytes, related: Option<SampleId>) {
-        let start = Instant::now();
-        while let Some(writer) = self.writer() {
-            let may_wait = self.when_full == WhenFull::Wait;
-            let left = match self.when_full {
-                WhenFull::Wait => WARNING_PERIOD,
-                WhenFull::Drop if self.stuck.load(Relaxed) => {
-                    PATIENCE_WITH_STUCK_PEER.saturating_sub(start.elapsed())
-                }
-                WhenFull::Drop => PATIENCE.saturating_sub(start.elapsed()),
-            };
-            let write = writer.write(body.clone(), related);
-            let result = match select(write, Timer::after(left)).await {
-                Either::Left((result, _)) => result,
-                Either::Right(_) if may_wait => {
-                    let topic = &self.topic;
-                    log::warn!(
-                        "{topic}: waiting for a reliable subscriber that does not acknowledge"
-                    );
-                    continue;
-                }
-                Either::Right(_) => {
-                    self.stuck.store(true, Relaxed);
-                    return match writer.is_sending(&body) {
-                        true => self.count_sent(&body),
-                        false => self.drop_one("a reliable subscriber does not keep up"),
-                    };
-                }
-            };
-            match result {
-                Ok(_) => {
-                    self.stuck.store(false, Relaxed);
-                    return self.count_sent(&body);
-                }
-                // The transport's timeout is shorter; our own patience decides.
-                Err(WriteRefusal::Full) => {}
-                Err(WriteRefusal::Failed(why)) => return self.drop_one(&why),
-            }
         }
     }
 }

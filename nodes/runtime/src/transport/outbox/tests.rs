@@ -3,6 +3,7 @@
 use futures::future::BoxFuture;
 
 use super::*;
+use crate::transport::port::WriteRefusal;
 
 /// A writer whose reader does not acknowledge.
 struct Stuck;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use zenoh::Config;
 
-use super::session::words;
+use super::error_text::words;
 use crate::config::env::{
     Network, ZENOH_CHECK_ATTEMPTS as CHECK_ATTEMPTS, ZENOH_OVERRIDE as OVERRIDE,
     ZENOH_SESSION_CONFIG as SESSION_CONFIG,

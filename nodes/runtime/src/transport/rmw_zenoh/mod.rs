@@ -5,6 +5,7 @@
 
 mod attachment;
 mod config;
+mod error_text;
 mod graph;
 mod keys;
 mod publisher;

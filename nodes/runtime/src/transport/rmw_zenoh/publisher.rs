@@ -16,8 +16,8 @@ use zenoh::sample::Locality;
 use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, CacheConfig, MissDetectionConfig};
 
 use super::attachment::attachment;
+use super::error_text::words;
 use super::graph::Place;
-use super::session::words;
 use crate::sync::lock;
 use crate::transport::port::{Bytes, EndpointId, SampleId, SampleWriter, WriteRefusal};
 use crate::transport::qos::{Durability, Qos, Reliability};

@@ -14,6 +14,7 @@ use zenoh::pubsub::Subscriber;
 use zenoh::sample::SampleKind;
 
 use super::config::{self, CHECK_PERIOD, RouterCheck};
+pub(super) use super::error_text::words;
 use super::graph::{Graph, Place};
 use super::keys::{Channel, Kind, Session, gid};
 use super::publisher::ZenohPublisher;
@@ -189,13 +190,6 @@ fn failed(name: &str, endpoint: &'static str, reason: impl ToString) -> RuntimeE
         endpoint,
         reason: words(reason),
     }
-}
-
-/// Text of a Zenoh error, without source locations.
-pub(super) fn words(error: impl ToString) -> String {
-    let text = error.to_string();
-    let words = text.split(" at /").next().unwrap_or_default();
-    words.trim_end().to_owned()
 }
 
 impl Transport for Zenoh {
