@@ -12,7 +12,7 @@ use lattice_cyclone_sys::{
 };
 use smol::channel::Sender;
 
-pub(super) use super::builtin_topic::take_all;
+use super::builtin_topic::take_all;
 use super::endpoint::{Description, Endpoint, Side};
 use super::entity::{Entity, endpoint_id};
 use super::names::role;

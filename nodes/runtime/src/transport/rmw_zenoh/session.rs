@@ -14,7 +14,7 @@ use zenoh::pubsub::Subscriber;
 use zenoh::sample::SampleKind;
 
 use super::config::{self, CHECK_PERIOD, RouterCheck};
-pub(super) use super::error_text::words;
+use super::error_text::words;
 use super::graph::{Graph, Place};
 use super::keys::{Channel, Kind, Session, gid};
 use super::publisher::ZenohPublisher;
