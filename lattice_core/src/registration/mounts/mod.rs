@@ -12,6 +12,7 @@ mod correction;
 mod jackknife;
 mod mount_number;
 mod planes;
+mod quick;
 mod refine;
 mod samples;
 #[cfg(test)]
@@ -87,10 +88,46 @@ pub fn estimate_mount(
     options: &MountOptions,
 ) -> Result<MountEstimate, MountError> {
     check_motion(&samples.poses)?;
-    let offset = match options.with_time {
+    estimate_about(offset_of(samples, options), samples, options)
+}
+
+/// Checks the stated mount: `None` if no observable correction near it is certain and above `least` (rad, m, s), else
+/// the estimate. Costs a fraction of [`estimate_mount`] where the mount fits.
+///
+/// # Errors
+/// As [`estimate_mount`].
+pub fn check_mount(
+    samples: &MountSamples,
+    options: &MountOptions,
+    least: [f64; 3],
+) -> Result<Option<MountEstimate>, MountError> {
+    check_motion(&samples.poses)?;
+    let offset = offset_of(samples, options);
+    let is_near = match offset {
+        Offset::Nothing => true,
+        Offset::Near(offset_s) => offset_s.abs() < LEAST_OFFSET_S,
+        Offset::Far(_) => false,
+    };
+    // Too few flat cells may be the fault of the stated mount.
+    if is_near && quick::fits_as_stated(&centered(samples), options, least).unwrap_or(false) {
+        return Ok(None);
+    }
+    estimate_about(offset, samples, options).map(Some)
+}
+
+fn offset_of(samples: &MountSamples, options: &MountOptions) -> Offset {
+    match options.with_time {
         true => time_scan::search(samples),
         false => Offset::Nothing,
-    };
+    }
+}
+
+/// Estimate where the times of points have an offset.
+fn estimate_about(
+    offset: Offset,
+    samples: &MountSamples,
+    options: &MountOptions,
+) -> Result<MountEstimate, MountError> {
     match offset {
         Offset::Nothing => estimate_from(samples, samples, options),
         Offset::Far(offset_s) => {
@@ -173,8 +210,9 @@ fn estimate_from(
     let is_large = correction.rotation.angle() > LARGE_RAD || correction.shift_m.norm() > LARGE_M;
     let limit = if is_large { 0.995 } else { 1.02 };
     // One that is certain makes surfaces thinner where it is right.
-    let is_certain =
-        |number: &MountNumber| number.is_observable && number.value.abs() > 3.0 * number.sigma;
+    let is_certain = |number: &MountNumber| {
+        number.is_observable && number.value.abs() > quick::CERTAIN * number.sigma
+    };
     let is_thicker = after.thickness_m > before.thickness_m && numbers.iter().any(is_certain);
     if outside || is_thicker || after.voxels as f64 > limit * before.voxels as f64 {
         return Err(MountError::NoFit {

@@ -1,6 +1,6 @@
 //! Numbers of a mount, and options of their estimate.
 
-/// Options of [`estimate_mount`].
+/// Options of [`super::estimate_mount`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MountOptions {
     /// Largest standard deviation of an excited rotation, radians.
@@ -39,4 +39,11 @@ pub struct MountNumber {
     pub sigma: f64,
     /// True if the motion excited the number, so that the log determines it.
     pub is_observable: bool,
+}
+
+impl MountOptions {
+    /// Largest standard deviations of excited numbers: rad, m, s.
+    pub(super) fn max_sigmas(&self) -> [f64; 3] {
+        [self.max_sigma_rad, self.max_sigma_m, self.max_sigma_s]
+    }
 }

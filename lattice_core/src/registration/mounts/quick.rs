@@ -28,11 +28,11 @@ pub(super) fn fits_as_stated(
             iterate(samples, &mut correction, cell_m, STEPS, &is_free)?;
         }
         let found = sigmas(samples, &correction, cell_m, &is_free, options);
-        let numbers = found.iter().zip(correction.vector().iter().copied());
+        let vector = correction.vector();
         let mut is_observable = is_free;
-        for (i, (sigma, value)) in numbers.enumerate() {
+        for (i, sigma) in found.iter().enumerate() {
             is_observable[i] &= *sigma <= limits[kind(i)];
-            if is_observable[i] && value.abs() > least[kind(i)].max(CERTAIN * sigma) {
+            if is_observable[i] && vector[i].abs() > least[kind(i)].max(CERTAIN * sigma) {
                 return Ok(false);
             }
         }
