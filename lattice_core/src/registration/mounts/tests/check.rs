@@ -15,10 +15,10 @@ fn a_check_finds_what_an_estimate_finds() {
     let mut random = Random(20);
     let mut wrong_ones = 0;
     let options = MountOptions::default();
-    for seed in 20..32 {
+    for seed in 20..28 {
         let drive = [Drive::Rough, Drive::Flat, Drive::Straight][seed as usize % 3];
         // From mounts that are hardly wrong to the ends of the search.
-        let size = 0.9_f64.powi(31 - seed as i32);
+        let size = 0.8_f64.powi(27 - seed as i32);
         let turn = [(); 3].map(|()| 14.0 * size * random.next());
         let shift = [(); 3].map(|()| 0.9 * size * random.next());
         let samples = samples(drive, &wrong(turn, shift), 0.0, seed);
@@ -32,7 +32,7 @@ fn a_check_finds_what_an_estimate_finds() {
         }
         wrong_ones += usize::from(found.is_ok_and(|found| is_wrong(&found)));
     }
-    assert!(wrong_ones > 6, "{wrong_ones}");
+    assert!(wrong_ones > 4, "{wrong_ones}");
 }
 
 #[test]
