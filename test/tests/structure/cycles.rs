@@ -175,6 +175,8 @@ impl Crate {
             match self.named(&here, name, seen) {
                 Some(Target::Module(found)) => here = found,
                 Some(item) => return Some(item),
+                // Of another crate.
+                None if self.imports(&here, name) => return None,
                 // A macro, or something that another macro made.
                 None => {
                     let holder = self.0.iter().find(|(_, file)| file.macros.contains(name));
@@ -184,6 +186,12 @@ impl Crate {
             }
         }
         Some(Target::Module(here))
+    }
+
+    /// Tests whether a module imports a name.
+    fn imports(&self, module: &Names, name: &str) -> bool {
+        let file = self.0.get(module);
+        file.is_some_and(|file| file.imports.iter().any(|(_, here, _)| here == name))
     }
 
     /// What a name means in a module.
