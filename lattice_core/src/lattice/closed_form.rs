@@ -4,13 +4,6 @@
 //! D3. It returns the index in the paper's basis. Only +, -, *, comparisons and rounding half to even are used, so
 //! every machine gives the same bits. On a cell border: half to even, the uncentred coset, the lowest axis.
 
-use std::sync::Arc;
-
-use nalgebra::Matrix3;
-
-use super::LatticeKind;
-use super::basis::Basis;
-
 /// Addend that leaves a double, rounded half to even, as an integer in its low bits.
 const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
 
@@ -61,7 +54,7 @@ pub(super) trait ClosedForm: Copy {
 /// Z^3.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cubic {
-    per_metre: f64,
+    pub(super) per_metre: f64,
 }
 
 impl ClosedForm for Cubic {
@@ -87,7 +80,7 @@ fn centred(u: [f64; 3], z_weight: f64) -> [i64; 3] {
 /// Body-centred cubic lattice in the axes of the paper.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bcc {
-    per_metre: f64,
+    pub(super) per_metre: f64,
 }
 
 impl ClosedForm for Bcc {
@@ -104,7 +97,7 @@ impl ClosedForm for Bcc {
 /// Mean-centred cuboidal lattice: centred tetragonal with c/a = 2^(1/4), in axes rotated by `turn`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mcc {
-    turn: [[f64; 3]; 3],
+    pub(super) turn: [[f64; 3]; 3],
 }
 
 impl ClosedForm for Mcc {
@@ -123,7 +116,7 @@ impl ClosedForm for Mcc {
 /// Face-centred cubic lattice as D3, the integer points of even sum.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fcc {
-    per_metre: f64,
+    pub(super) per_metre: f64,
 }
 
 impl ClosedForm for Fcc {
@@ -149,7 +142,7 @@ impl ClosedForm for Fcc {
 /// Hexagonal prisms: a centred plane lattice with sides 1 : sqrt 3, times the heights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hex {
-    per_metre: [f64; 3],
+    pub(super) per_metre: [f64; 3],
 }
 
 impl ClosedForm for Hex {
@@ -166,81 +159,14 @@ impl ClosedForm for Hex {
     }
 }
 
-/// Closed form of a lattice; a custom basis uses a short search instead.
-#[derive(Clone, Debug)]
-pub(super) enum Quantizer {
-    Cubic(Cubic),
-    Bcc(Bcc),
-    Fcc(Fcc),
-    Mcc(Mcc),
-    Hex(Hex),
-    Basis(Arc<Basis>),
-}
-
-/// Dispatches on the form once, outside the loop.
-macro_rules! with_form {
-    ($quantizer:expr, $form:ident => $body:expr) => {
-        match $quantizer {
-            &Quantizer::Cubic($form) => $body,
-            &Quantizer::Bcc($form) => $body,
-            &Quantizer::Fcc($form) => $body,
-            &Quantizer::Mcc($form) => $body,
-            &Quantizer::Hex($form) => $body,
-            Quantizer::Basis(basis) => {
-                let $form = basis.as_ref();
-                $body
-            }
-        }
-    };
-}
-pub(super) use with_form;
-
-impl Quantizer {
-    /// Form of a generator in metres, oriented as in the paper; `None` for `Custom`.
-    pub(super) fn new(kind: LatticeKind, g: &Matrix3<f64>) -> Option<Quantizer> {
-        Some(match kind {
-            LatticeKind::Cubic => Self::Cubic(Cubic {
-                per_metre: 1.0 / g.m11,
-            }),
-            LatticeKind::Bcc => Self::Bcc(Bcc {
-                per_metre: 1.0 / g.m11,
-            }),
-            LatticeKind::Fcc => Self::Fcc(Fcc {
-                per_metre: 1.0 / g.m12,
-            }),
-            LatticeKind::Mcc => Self::Mcc(Mcc {
-                turn: cuboid_axes(g),
-            }),
-            LatticeKind::Hex | LatticeKind::HexOptimal => Self::Hex(Hex {
-                per_metre: [1.0 / g.m11, 0.5 / g.m22, 1.0 / g.m33],
-            }),
-            LatticeKind::Custom => return None,
-        })
-    }
-}
-
-/// Rows that map a point to units of the sides of the MCC cuboid: S G^-1 / 2.
-///
-/// S (rows 1,1,-1; -1,1,1; 1,-1,1) expresses the paper's basis as half diagonals. S G^-1 is a rotation up to the
-/// sides, so it preserves distances.
-fn cuboid_axes(g: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    // Inverse of an upper triangular matrix.
-    let (i11, i22, i33) = (1.0 / g.m11, 1.0 / g.m22, 1.0 / g.m33);
-    let (i12, i23) = (-g.m12 * i11 * i22, -g.m23 * i22 * i33);
-    let i13 = (g.m12 * g.m23 * i22 - g.m13) * i11 * i33;
-    [
-        [0.5 * i11, 0.5 * (i12 + i22), 0.5 * (i13 + i23 - i33)],
-        [-0.5 * i11, 0.5 * (i22 - i12), 0.5 * (i23 - i13 + i33)],
-        [0.5 * i11, 0.5 * (i12 - i22), 0.5 * (i13 - i23 + i33)],
-    ]
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use crate::lattice::LatticeKind;
     use crate::lattice::generator::unit_generator;
+    use crate::lattice::quantizer::cuboid_axes;
 
     #[test]
     fn split_rounds_half_to_even() {

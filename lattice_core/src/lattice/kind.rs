@@ -1,11 +1,8 @@
 //! Kinds of lattices and their names.
 
 use std::fmt;
-use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
-
-use super::LatticeError;
 
 /// Kind of a lattice: those of Ryde & Brünig 2011, section II-A, the optimal prisms, and custom ones.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
@@ -59,17 +56,6 @@ impl LatticeKind {
 impl fmt::Display for LatticeKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
-    }
-}
-
-impl FromStr for LatticeKind {
-    type Err = LatticeError;
-
-    fn from_str(name: &str) -> Result<Self, LatticeError> {
-        Self::ALL
-            .into_iter()
-            .find(|kind| kind.name() == name)
-            .ok_or_else(|| LatticeError::UnknownName(name.chars().take(40).collect()))
     }
 }
 

@@ -3,28 +3,14 @@
 //! The number of cells that flat ground occupies grows with the height of the cell. In the paper's axes FCC cells are
 //! 1.587 cell sizes tall and BCC cells 1.260; in the ground orientation they are 1.122 and 1.091.
 
-use std::fmt;
 use std::str::FromStr;
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
+use super::error::LatticeError;
 use super::generator::unit_generator;
-use super::{Lattice, LatticeError, LatticeKind};
-
-/// Named orientation of a lattice in the map, whose z axis is up.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum Orientation {
-    /// Axes of the paper, `paper`.
-    #[default]
-    Paper,
-    /// Flattest cell: a shortest lattice vector up, `ground`.
-    Ground,
-    /// Crystal direction up, such as `110-up`; each entry is 0 or 1.
-    ///
-    /// The axes are those of the cube of cubic, BCC and FCC and of the cuboid of MCC, with the long side last. The
-    /// other lattices have none.
-    Up([u8; 3]),
-}
+use super::kind::LatticeKind;
+pub use super::named_orientation::Orientation;
 
 impl Orientation {
     /// Rotation from the axes of the paper to those of the map, computed by square roots only, so that every machine
@@ -50,23 +36,6 @@ impl Orientation {
     }
 }
 
-impl Lattice {
-    /// Rotates the lattice to a named orientation; see [`Orientation`].
-    pub fn with_orientation(self, orientation: Orientation) -> Result<Lattice, LatticeError> {
-        let rotation = match (self.kind(), orientation) {
-            (LatticeKind::Custom, Orientation::Ground) => {
-                let vectors = self.face_neighbors().iter();
-                let basis = self.unoriented_generator();
-                let vectors = vectors.map(|w| basis * Vector3::from(w.map(f64::from)));
-                let shortest = vectors.min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
-                shortest.map_or_else(UnitQuaternion::identity, upright)
-            }
-            (kind, _) => orientation.map_from_lattice(kind)?,
-        };
-        Ok(self.oriented(rotation))
-    }
-}
-
 /// Crystal direction in the axes of the paper; not normalized.
 fn crystal_direction(kind: LatticeKind, axis: [u8; 3]) -> Option<Vector3<f64>> {
     let [h, k, l] = axis.map(f64::from);
@@ -79,7 +48,7 @@ fn crystal_direction(kind: LatticeKind, axis: [u8; 3]) -> Option<Vector3<f64>> {
 }
 
 /// Smallest rotation of a direction in the upper half space to z.
-fn upright(direction: Vector3<f64>) -> UnitQuaternion<f64> {
+pub(super) fn upright(direction: Vector3<f64>) -> UnitQuaternion<f64> {
     let direction = if direction.z < 0.0 {
         -direction
     } else {
@@ -127,16 +96,6 @@ pub(super) fn canonical(rotation: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     }
 }
 
-impl fmt::Display for Orientation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Paper => f.pad("paper"),
-            Self::Ground => f.pad("ground"),
-            Self::Up([h, k, l]) => f.pad(&format!("{h}{k}{l}-up")),
-        }
-    }
-}
-
 impl FromStr for Orientation {
     type Err = LatticeError;
 
@@ -162,6 +121,7 @@ impl FromStr for Orientation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lattice::Lattice;
 
     /// Extent of the cell along z, unit volume.
     fn height(kind: LatticeKind, name: &str) -> f64 {

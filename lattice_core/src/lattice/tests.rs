@@ -3,6 +3,9 @@
 use proptest::prelude::*;
 
 use super::*;
+use nalgebra::Matrix3;
+use nalgebra::UnitQuaternion;
+use nalgebra::Vector3;
 
 fn any_lattice() -> impl Strategy<Value = Lattice> {
     (0..LatticeKind::ALL.len(), -9.0..9.0_f64)

@@ -10,7 +10,7 @@ use super::{
     BagError, Messages, Storage, TopicInfo,
     messages::MessageCompression,
     metadata::{CompressionMode, Metadata},
-    recover::is_sqlite,
+    sniff::is_sqlite,
     split::{OpenFile, Split},
     split_list::{in_order_of_time, listed_splits, splits_in},
     storage::{Filter, TopicIndex, full_type_name, merge_topic},

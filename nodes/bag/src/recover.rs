@@ -9,7 +9,6 @@ use serde::Serialize;
 use super::{
     BagError, BagReader, BagWriter, ReadOptions, Storage, TopicInfo, TopicSpec, WriterOptions,
     metadata::Metadata,
-    sniff::{FileKind, identify},
     split_list::{is_storage, list},
 };
 
@@ -191,14 +190,4 @@ pub(crate) fn add(
     })?;
     known.insert(key, place);
     Ok(place)
-}
-
-/// True for an SQLite file, compressed or not.
-pub(crate) fn is_sqlite(path: &Path) -> bool {
-    let named = path.to_string_lossy().contains(".db3");
-    identify(path).map_or(named, |kind| match kind {
-        FileKind::Sqlite3 => true,
-        FileKind::Mcap | FileKind::Ros1 => false,
-        FileKind::Zstd => named,
-    })
 }

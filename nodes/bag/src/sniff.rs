@@ -133,6 +133,16 @@ fn identify_bytes(head: &[u8]) -> Result<FileKind, (String, &'static str)> {
     Err((found.to_owned(), remedy))
 }
 
+/// True for an SQLite file, compressed or not.
+pub(crate) fn is_sqlite(path: &Path) -> bool {
+    let named = path.to_string_lossy().contains(".db3");
+    identify(path).map_or(named, |kind| match kind {
+        FileKind::Sqlite3 => true,
+        FileKind::Mcap | FileKind::Ros1 => false,
+        FileKind::Zstd => named,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,5 +1,7 @@
 //! The `lattice` command, and every node by its name.
 
+mod lattices;
+mod tool_log;
 // First, for its macros.
 #[macro_use]
 mod streams;
@@ -10,6 +12,7 @@ mod bag;
 mod calendar;
 mod calibrate;
 mod cell_size;
+mod cli_result;
 mod doctor;
 mod fleet;
 mod health;
@@ -29,14 +32,13 @@ mod run;
 #[cfg(feature = "viewer")]
 mod view;
 
-use std::error::Error;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use lattice_core::lattice::LatticeKind;
 
-/// Result of a command, with any error for the user.
-type CliResult<T = ()> = Result<T, Box<dyn Error + Send + Sync>>;
+use cli_result::CliResult;
+use lattices::Lattices;
+use tool_log::init_logging;
 
 /// Lattice voxel maps from logs and live robots.
 #[derive(Parser)]
@@ -131,40 +133,4 @@ impl Command {
             Command::Lab(command) => command.run(),
         }
     }
-}
-
-/// Lattices by name, those of the `paper`, or `all`.
-#[derive(Clone, Debug)]
-struct Lattices(pub Vec<LatticeKind>);
-
-impl std::str::FromStr for Lattices {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "all" => return Ok(Self(LatticeKind::ALL.to_vec())),
-            "paper" => return Ok(Self(LatticeKind::PAPER.to_vec())),
-            _ => {}
-        }
-        let kinds = text.split(',').map(|name| {
-            let kind = name.trim().parse::<LatticeKind>();
-            kind.map_err(|e| format!("{e}; or 'all', or 'paper' for the five of the paper"))
-        });
-        kinds.collect::<Result<_, _>>().map(Self)
-    }
-}
-
-/// Initializes the log of the tools; nodes have their own.
-fn init_logging() {
-    let env = env_logger::Env::default().default_filter_or("warn");
-    // A second command in one process (tests) keeps the first logger.
-    let _ = env_logger::Builder::from_env(env)
-        .format_timestamp(None)
-        .format_target(false)
-        // Commands warn of short receive buffers only after a loss.
-        .filter_module(
-            "lattice_runtime::node::shared::status",
-            log::LevelFilter::Error,
-        )
-        .try_init();
 }

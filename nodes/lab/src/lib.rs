@@ -2,12 +2,9 @@
 //! benchmarks. A robot builds none of it.
 #![deny(unsafe_code)]
 
-use std::error::Error;
-use std::fmt::Display;
-use std::path::Path;
-
 pub mod bench;
 pub mod datasets;
+mod error;
 pub mod evaluate;
 mod matching;
 pub use lattice_nodes::mesh;
@@ -23,19 +20,6 @@ mod report;
 pub mod simulate;
 pub mod theory;
 
+use error::at;
+pub use error::{AnyError, pool};
 pub use report::{Report, markdown, write_report};
-
-/// Any error on its way to the user.
-pub type AnyError = Box<dyn Error + Send + Sync>;
-
-/// Thread pool of `threads` threads, at least one.
-pub fn pool(threads: usize) -> Result<rayon::ThreadPool, AnyError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1));
-    Ok(pool.build()?)
-}
-
-/// Adds the path of a file to its error.
-fn at<E: Display>(path: &Path) -> impl Fn(E) -> AnyError + use<E> {
-    let path = path.to_owned();
-    move |error| format!("{}: {error}", path.display()).into()
-}

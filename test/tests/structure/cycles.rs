@@ -175,6 +175,8 @@ impl Crate {
             match self.named(&here, name, seen) {
                 Some(Target::Module(found)) => here = found,
                 Some(item) => return Some(item),
+                // Of another crate.
+                None if self.imports(&here, name) => return None,
                 // A macro, or something that another macro made.
                 None => {
                     let holder = self.0.iter().find(|(_, file)| file.macros.contains(name));
@@ -184,6 +186,12 @@ impl Crate {
             }
         }
         Some(Target::Module(here))
+    }
+
+    /// Tests whether a module imports a name.
+    fn imports(&self, module: &Names, name: &str) -> bool {
+        let file = self.0.get(module);
+        file.is_some_and(|file| file.imports.iter().any(|(_, here, _)| here == name))
     }
 
     /// What a name means in a module.
@@ -319,19 +327,35 @@ fn file_of(source: &Path, module: &[String]) -> std::path::PathBuf {
     }
 }
 
-/// Crates without cycles of files.
-const CRATES: [&str; 1] = ["nodes/runtime/src"];
+/// Crates, and the number of their files that are in cycles. A number may fall, not rise.
+const CRATES: [(&str, usize); 6] = [
+    ("lattice_core/src", 4),
+    ("nodes/src", 118),
+    ("nodes/runtime/src", 0),
+    ("nodes/bag/src", 0),
+    ("nodes/lab/src", 75),
+    ("nodes/cli/src", 0),
+];
 
 #[test]
 fn files_point_one_way() {
-    let mut report = String::new();
-    for source in CRATES {
+    for (source, allowed) in CRATES {
         let files = Crate::read(&root().join(source));
-        for cycle in files.cycles() {
+        let cycles = files.cycles();
+        let count: usize = cycles.iter().map(Vec::len).sum();
+        let mut report = String::new();
+        for cycle in &cycles {
             let names: Vec<String> = cycle.iter().map(|module| shown(module)).collect();
-            report += &format!("{source}: these use each other: {}\n", names.join(", "));
-            report += &files.describe(&cycle);
+            report += &format!("these use each other: {}\n", names.join(", "));
+            report += &files.describe(cycle);
         }
+        assert!(
+            count <= allowed,
+            "{source}: {count} files are in cycles, {allowed} are allowed:\n{report}"
+        );
+        assert!(
+            count >= allowed,
+            "{source}: {count} files are in cycles: write this number into CRATES"
+        );
     }
-    assert!(report.is_empty(), "{report}");
 }

@@ -73,21 +73,27 @@ fn character(text: &str) -> usize {
     }
 }
 
-/// Tokens without the items that `#[cfg(test)]` stands before.
+/// Tokens without the items that `#[cfg(test)]` or `#[cfg(all(test, ...))]` stands before.
 fn without_tests(all: &[String]) -> Vec<String> {
-    const TEST: [&str; 7] = ["#", "[", "cfg", "(", "test", ")", "]"];
     let mut kept = Vec::new();
     let mut at = 0;
     while let Some(token) = all.get(at) {
-        if all[at..].iter().take(TEST.len()).eq(TEST.iter()) {
-            at += TEST.len();
-            at += item_length(&all[at..]);
+        if is_test(&all[at..]) {
+            let end = all[at..].iter().position(|token| token == "]");
+            at += end.map_or(all.len(), |end| end + 1);
+            at += item_length(all.get(at..).unwrap_or_default());
         } else {
             kept.push(token.clone());
             at += 1;
         }
     }
     kept
+}
+
+fn is_test(tokens: &[String]) -> bool {
+    let begins = |words: &[&str]| tokens.iter().take(words.len()).eq(words.iter());
+    begins(&["#", "[", "cfg", "(", "test", ")"])
+        || begins(&["#", "[", "cfg", "(", "all", "(", "test", ","])
 }
 
 /// Number of tokens to the end of an item: a semicolon or comma outside of brackets, or a closed brace.
@@ -122,6 +128,8 @@ fn comments_strings_and_tests_are_left_out() {
         use l::{m};
         #[cfg(test)]
         mod tests { fn n() {} }
+        #[cfg(all(test, feature = "o"))]
+        mod more { fn p() {} }
     "##;
     let words: String = tokens(text)
         .into_iter()

@@ -1,7 +1,7 @@
 //! Coordinate types of a batch: single or double precision.
 
+use super::batch_quantizer::{BatchBlock, BatchQuantizer, BatchSums};
 use super::kernel::{BLOCK, Lanes};
-use super::{BatchBlock, BatchQuantizer, BatchSums};
 use crate::lattice::{BlockKey, nearest_integer};
 
 /// Units of [`BatchBlock::fixed`] per metre.

@@ -3,7 +3,13 @@
 use nalgebra::{Translation3, UnitQuaternion};
 use proptest::prelude::*;
 
+use super::kernel::STEPS;
 use super::*;
+use crate::lattice::BlockKey;
+use crate::lattice::Lattice;
+use crate::lattice::LatticeKind;
+use nalgebra::Isometry3;
+use nalgebra::Vector3;
 
 fn lattices() -> impl Strategy<Value = Lattice> {
     (0..LatticeKind::ALL.len(), -6.0..6.0_f64)

@@ -1,6 +1,7 @@
 //! MCAP storage files: indexed by the summary, or by a scan of the whole file.
 
 mod contents;
+mod file;
 mod lengths;
 mod packed;
 mod records;
@@ -10,11 +11,7 @@ mod scan;
 mod stream;
 mod summary;
 
-use std::{
-    fs::File,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{fs::File, path::Path, sync::Arc};
 
 use mcap::records::{Record, op};
 use tempfile::TempPath;
@@ -22,26 +19,12 @@ use tempfile::TempPath;
 use super::{
     BagError,
     sniff::MCAP_MAGIC,
-    storage::{Filter, StorageInfo, StorageStream},
+    storage::{Filter, StorageStream},
 };
-use contents::{Block, Routes};
+pub(crate) use file::McapFile;
 use lengths::parse_record;
 use records::{Cause, Place, RecordError, first_record};
 use stream::McapStream;
-
-/// An indexed MCAP file.
-pub(crate) struct McapFile {
-    path: PathBuf,
-    temporary: Option<Arc<TempPath>>,
-    blocks: Vec<Block>,
-    topic_of: Arc<Routes>,
-    damages: Vec<BagError>,
-    /// True if messages outside of chunks, which have no checksum, may be altered.
-    unchecked: bool,
-    /// Number of messages by the summary, if readable.
-    pub(crate) claimed: Option<u64>,
-    pub(crate) info: StorageInfo,
-}
 
 impl McapFile {
     /// Opens `path`, which may be a temporary copy that is deleted with the last reader.

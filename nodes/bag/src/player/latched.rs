@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use super::{PlayedTopic, wanted};
+use super::PlayedTopic;
 use crate::{BagMessage, BagReader, TopicInfo, storage::Filter, topic::STATIC_DEPTH};
 
 /// Limit of messages kept per topic.
@@ -133,4 +133,18 @@ fn drop_oldest(messages: &mut VecDeque<BagMessage>, topic: usize) -> usize {
     oldest
         .and_then(|index| messages.remove(index))
         .map_or(0, |m| m.data.len())
+}
+
+/// Selected topics, by index of the reader.
+pub(super) fn wanted<'a>(
+    reader: &BagReader,
+    played: impl IntoIterator<Item = &'a PlayedTopic>,
+) -> Vec<bool> {
+    let mut wanted = vec![false; reader.topics().len()];
+    for topic in played {
+        if let Some(wanted) = wanted.get_mut(topic.bag_topic) {
+            *wanted = true;
+        }
+    }
+    wanted
 }

@@ -12,7 +12,7 @@ mod timeline;
 use std::collections::VecDeque;
 
 use super::{BagError, BagMessage, BagReader, Messages, storage::Filter};
-use latched::{given_at, static_transforms};
+use latched::{given_at, static_transforms, wanted};
 pub use options::{PlayedTopic, PlayerOptions};
 use options::{RATES, ns_from_s};
 use timeline::Timeline;
@@ -290,15 +290,4 @@ impl Player {
         self.start_pass(self.start_ns);
         Ok(Step::Looped)
     }
-}
-
-/// Selected topics, by index of the reader.
-fn wanted<'a>(reader: &BagReader, played: impl IntoIterator<Item = &'a PlayedTopic>) -> Vec<bool> {
-    let mut wanted = vec![false; reader.topics().len()];
-    for topic in played {
-        if let Some(wanted) = wanted.get_mut(topic.bag_topic) {
-            *wanted = true;
-        }
-    }
-    wanted
 }

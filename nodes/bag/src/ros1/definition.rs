@@ -3,7 +3,6 @@
 use std::collections::{HashMap, HashSet};
 
 use super::added::{ADDED, NEEDED};
-use super::ros2_text::constant;
 
 /// Limits of a definition: text, types, fields of a type, nesting.
 const MAX_TEXT_BYTES: usize = 4 << 20;
@@ -300,6 +299,26 @@ fn kind(element: &str, within: &str, places: &HashMap<&str, usize>) -> Option<Ki
         name => format!("{package}/{name}"),
     };
     places.get(name.as_str()).copied().map(Kind::Message)
+}
+
+/// Constant in the form of ROS 2; `None` if that has no such constant.
+fn constant(type_name: &str, line: &str) -> Option<String> {
+    let (left, value) = line.split_once('=')?;
+    let name = left.split_whitespace().last()?.to_uppercase();
+    let is_name = name.starts_with(|c: char| c.is_ascii_uppercase())
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    let value = match type_name {
+        // All of the line belongs to a text.
+        "string" => format!("{:?}", value.trim()),
+        _ => value
+            .split('#')
+            .next()
+            .unwrap_or_default()
+            .trim()
+            .to_owned(),
+    };
+    let is_number = PRIMITIVES.iter().any(|(known, ..)| *known == type_name);
+    (is_name && (is_number || type_name == "string")).then(|| format!("{type_name} {name}={value}"))
 }
 
 #[cfg(test)]

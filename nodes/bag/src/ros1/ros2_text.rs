@@ -56,26 +56,6 @@ impl Definition {
     }
 }
 
-/// Constant in the form of ROS 2; `None` if that has no such constant.
-pub(super) fn constant(type_name: &str, line: &str) -> Option<String> {
-    let (left, value) = line.split_once('=')?;
-    let name = left.split_whitespace().last()?.to_uppercase();
-    let is_name = name.starts_with(|c: char| c.is_ascii_uppercase())
-        && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-    let value = match type_name {
-        // All of the line belongs to a text.
-        "string" => format!("{:?}", value.trim()),
-        _ => value
-            .split('#')
-            .next()
-            .unwrap_or_default()
-            .trim()
-            .to_owned(),
-    };
-    let is_number = PRIMITIVES.iter().any(|(known, ..)| *known == type_name);
-    (is_name && (is_number || type_name == "string")).then(|| format!("{type_name} {name}={value}"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::definition::ros2_name;

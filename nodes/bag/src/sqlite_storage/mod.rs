@@ -1,13 +1,15 @@
 //! SQLite storage files of every rosbag2 schema, opened without writing files beside them.
 
 mod connection;
+mod file;
+mod message_key;
 mod salvage;
 mod stream;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
-    path::{Path, PathBuf},
+    path::Path,
     sync::{Arc, OnceLock},
 };
 
@@ -20,30 +22,14 @@ use super::{
     topic::absolute_name,
 };
 use connection::{Access, connect, mended_magic, missing_pages};
+pub(crate) use file::SqliteFile;
 use salvage::{Salvaged, salvage};
-use stream::{IMPLAUSIBLE, Key, SqliteStream};
+use stream::{IMPLAUSIBLE, SqliteStream};
 
 /// Limit of topics.
 const MAX_TOPICS: usize = 65_536;
 /// Limit of topics queried individually in a damaged table.
 const MAX_DAMAGED_TOPICS: i64 = 4096;
-
-/// An indexed SQLite file.
-pub(crate) struct SqliteFile {
-    path: PathBuf,
-    temporary: Option<Arc<TempPath>>,
-    topic_of: Arc<BTreeMap<i64, usize>>,
-    /// Readable messages in order of time, if damage prevents ordering by the database.
-    rescued: Option<Arc<Vec<Key>>>,
-    /// Name of the index of times, if any.
-    time_index: Option<String>,
-    /// True for a truncated file.
-    cut: bool,
-    salvaged: OnceLock<Arc<Salvaged>>,
-    /// True if rows, which have no checksum, may be altered.
-    unchecked: bool,
-    pub(crate) info: StorageInfo,
-}
 
 impl SqliteFile {
     /// Opens `path`, which may be a temporary copy that is deleted with the last reader.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use rusqlite::Connection;
 
-use super::stream::{KEY_COLUMNS, Key, key};
+use super::message_key::{KEY_COLUMNS, Key, key};
 use crate::BagError;
 
 /// Smallest message row: cell pointer (2), payload and row lengths (2), record header (5),

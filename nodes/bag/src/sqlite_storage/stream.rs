@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, collections::VecDeque, path::PathBuf, sync::Arc
 use rusqlite::{Connection, params};
 use tempfile::TempPath;
 
+use super::message_key::{KEY_COLUMNS, Key, key};
 use super::{SqliteFile, connection::connect};
 use crate::{
     BagError, MAX_MESSAGE_BYTES,
@@ -17,32 +18,8 @@ const PAGE_KEYS_UNSORTED: usize = 1 << 20;
 /// Limit of recovered keys.
 const MAX_RESCUED_KEYS: usize = 1 << 26;
 
-/// Key of a message, ordered by time, then by row.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) struct Key {
-    pub timestamp_ns: i64,
-    pub id: i64,
-    pub topic_id: i64,
-    size_bytes: u64,
-}
-
-/// Columns of a key; a topic id that is not a number becomes -1.
-pub(super) const KEY_COLUMNS: &str =
-    "SELECT timestamp, id, COALESCE(CAST(topic_id AS INTEGER), -1), octet_length(data)";
 /// Condition for an invalid message row, such as data shorter than a CDR header.
 pub(super) const IMPLAUSIBLE: &str = "typeof(timestamp) <> 'integer' OR timestamp < 0 OR octet_length(data) IS NULL OR octet_length(data) < 4";
-
-pub(super) fn key(row: &rusqlite::Row<'_>) -> Result<Key, rusqlite::Error> {
-    Ok(Key {
-        timestamp_ns: row.get(0)?,
-        id: row.get(1)?,
-        topic_id: row.get(2)?,
-        size_bytes: row
-            .get::<_, Option<i64>>(3)?
-            .and_then(|n| u64::try_from(n).ok())
-            .unwrap_or(0),
-    })
-}
 
 /// Keys of all rows before the first unreadable one.
 pub(super) fn readable_keys(connection: &Connection) -> Vec<Key> {

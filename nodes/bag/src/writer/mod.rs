@@ -3,11 +3,11 @@
 mod mcap_sink;
 mod parts;
 mod place;
+mod sink;
 mod sqlite_sink;
 
 use std::{
     collections::HashSet,
-    error::Error,
     fs,
     io::{self, Write},
     path::{Path, PathBuf},
@@ -17,15 +17,11 @@ use super::{
     BagError, BagQos, MAX_MESSAGE_BYTES, Storage, TopicInfo,
     metadata::{CountedTopic, FileInformation, METADATA_VERSION, Metadata, TopicMetadata},
 };
-use mcap::McapError;
 use parts::{Part, Written, ZSTD_LEVEL, described};
 use place::make_way;
 pub use place::replaceable;
-
-/// Distribution name in the metadata.
-const ROS_DISTRO: &str = "lattice";
-/// Length of the CDR encapsulation header.
-const ENCAPSULATION_BYTES: usize = 4;
+pub use sink::{Compression, TopicSpec};
+use sink::{ENCAPSULATION_BYTES, ROS_DISTRO, Sink, SinkError, failed};
 
 /// Options of a bag writer.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,54 +34,6 @@ pub struct WriterOptions {
     pub max_file_ns: Option<i64>,
     /// Compression with zstd.
     pub compression: Compression,
-}
-
-/// Compression of a bag being written.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Compression {
-    /// None.
-    #[default]
-    None,
-    /// Each message.
-    Messages,
-    /// Each storage file, once complete.
-    Files,
-}
-
-/// A topic to write.
-#[derive(Clone, Debug, Default)]
-pub struct TopicSpec {
-    /// Full topic name, such as "/tf".
-    pub name: String,
-    /// Type, such as "tf2_msgs/msg/TFMessage".
-    pub type_name: String,
-    /// Type hash, such as "RIHS01_..."; empty if unknown.
-    pub type_hash: String,
-    /// Message definition with its dependencies (ros2msg or ros2idl text).
-    pub definition: Option<String>,
-    /// QoS of the publishers.
-    pub offered_qos: Vec<BagQos>,
-}
-
-type SinkError = Box<dyn Error + Send + Sync>;
-
-/// Storage file being written; topics count from 0 in the order they are added.
-trait Sink: Send {
-    fn add_topic(&mut self, topic: &TopicInfo, qos: &str) -> Result<(), SinkError>;
-    fn write(&mut self, topic: usize, log_time_ns: i64, data: &[u8]) -> Result<(), SinkError>;
-    /// Passes all data to the system, so that they survive the process.
-    fn flush(&mut self) -> Result<(), SinkError>;
-    fn finish(self: Box<Self>, metadata: &str) -> Result<(), SinkError>;
-}
-
-fn failed(path: &Path, doing: &'static str) -> impl FnOnce(SinkError) -> BagError {
-    // The system's own error reports a full disk.
-    let system = |error: SinkError| match error.downcast().map(|error| *error) {
-        Ok(McapError::Io(error)) => error,
-        Ok(other) => io::Error::other(other),
-        Err(error) => io::Error::other(error),
-    };
-    move |error| BagError::io(path, doing)(system(error))
 }
 
 /// A bag being written. Without [`BagWriter::finish`] it lacks `metadata.yaml`.

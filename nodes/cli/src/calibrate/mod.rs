@@ -6,17 +6,17 @@ mod methods;
 #[cfg(feature = "bags")]
 mod mounts;
 pub mod options;
+mod progress;
 
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 use lattice_core::pose::Axes;
 use lattice_core::registration::{
-    CalibrationMap, CalibrationOptions, CalibrationRequest, SemanticCloud, SourceCloud, Stage,
-    Verdict, register_global,
+    CalibrationMap, CalibrationOptions, CalibrationRequest, SemanticCloud, SourceCloud, Verdict,
+    register_global,
 };
 use nalgebra::Isometry3;
 
@@ -28,6 +28,7 @@ use input::{Guess, Place};
 use lattice_nodes::files::classes::read_classes;
 use methods::{MethodName, register_once};
 use options::SearchOptions;
+use progress::{Shown, milliseconds};
 
 /// `lattice calibrate`, of a cloud or of what a subcommand names.
 pub enum CalibrateCommand {
@@ -245,25 +246,5 @@ impl Calibrate {
             input::keep_confusion(path, &calibration.confusion)?;
         }
         Ok(Answer::of_calibration(&calibration, options.profile, names))
-    }
-}
-
-fn milliseconds(since: Instant) -> f64 {
-    since.elapsed().as_secs_f64() * 1e3
-}
-
-/// Progress display of a calibration.
-struct Shown<'a>(&'a Progress);
-
-impl lattice_core::registration::Progress for Shown<'_> {
-    fn report(&self, stage: Stage, fraction: f64) -> ControlFlow<()> {
-        self.0.set(fraction);
-        self.0.say(match stage {
-            Stage::Prepare => "clouds",
-            Stage::Search => "search",
-            Stage::Refine => "refine",
-            Stage::Judge => "judge",
-        });
-        ControlFlow::Continue(())
     }
 }

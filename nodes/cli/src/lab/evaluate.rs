@@ -5,8 +5,8 @@ use super::evaluate_kitti::Kitti;
 use super::evaluate_many::{Many, Reliability, Rooms};
 use super::evaluate_odometry::OfDrives;
 use super::evaluate_scans::OfScans;
+use super::remaining::Remaining;
 use super::{Choice, choice, processors};
-use crate::progress::Progress;
 use crate::{CliResult, init_logging};
 use clap::{Args, Subcommand};
 use lattice_lab::evaluate::{
@@ -17,7 +17,6 @@ use lattice_lab::simulate::house::Scene;
 use lattice_lab::{markdown, write_report};
 use lattice_nodes::files::atomic_write::write_text;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
 
 /// Measure calibration and registration
 #[derive(Subcommand)]
@@ -203,37 +202,4 @@ impl Calibration {
             ..plan
         }
     }
-}
-
-/// Progress of an evaluation with the time that is left.
-pub(super) struct Remaining {
-    bar: Progress,
-    started: Instant,
-}
-
-impl Remaining {
-    pub fn new() -> Remaining {
-        Remaining {
-            bar: Progress::new("evaluate"),
-            started: Instant::now(),
-        }
-    }
-
-    /// Says how many trials are done, of all.
-    pub fn tell(&self, done: usize, total: usize) {
-        self.bar.set(done as f64 / total.max(1) as f64);
-        let share = total.saturating_sub(done) as f64 / done.max(1) as f64;
-        let left = clock(self.started.elapsed().mul_f64(share));
-        self.bar.say(&format!("{done} of {total}, {left} left"));
-    }
-
-    pub fn done(self) {
-        self.bar.done();
-    }
-}
-
-fn clock(time: Duration) -> String {
-    let seconds = time.as_secs();
-    let (hours, minutes) = (seconds / 3600, seconds / 60 % 60);
-    format!("{hours}:{minutes:02}:{:02}", seconds % 60)
 }

@@ -1,7 +1,7 @@
 //! `lattice evaluate chain`.
 
-use super::evaluate::Remaining;
 use super::processors;
+use super::remaining::Remaining;
 use crate::CliResult;
 use clap::Args;
 use lattice_lab::evaluate::{ChainOptions, Results, chain_report, chain_settings, run_chain};

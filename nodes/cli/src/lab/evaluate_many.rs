@@ -1,7 +1,7 @@
 //! `lattice evaluate traps`, `town`, `rooms` and `reliability`.
 
-use super::evaluate::Remaining;
 use super::processors;
+use super::remaining::Remaining;
 use crate::CliResult;
 use clap::Args;
 use lattice_lab::evaluate::{

@@ -5,6 +5,7 @@ mod bench_camera;
 mod bench_register;
 mod bench_segment;
 mod bench_transport;
+mod choice;
 mod demo;
 mod evaluate;
 mod evaluate_chain;
@@ -13,17 +14,16 @@ mod evaluate_many;
 mod evaluate_odometry;
 mod evaluate_scans;
 mod paper;
+mod picture;
+mod remaining;
+mod show;
 mod simulate;
 
 use crate::CliResult;
+use choice::{Choice, choice, processors};
 use clap::Subcommand;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use lattice_core::voxels::VoxelList;
-use lattice_lab::render::{RenderOptions, render_png};
-use lattice_nodes::files::atomic_write;
-use serde::Serialize;
-use std::fmt::Display;
-use std::path::Path;
+pub use picture::picture;
+use show::show;
 
 /// Commands of the laboratory.
 #[derive(Subcommand)]
@@ -55,38 +55,4 @@ impl Lab {
             Lab::Bench(command) => command.run(),
         }
     }
-}
-
-/// Draws a map as a PNG file.
-pub fn picture(list: &VoxelList, options: &RenderOptions, out: &Path) -> CliResult {
-    atomic_write::write(out, |file| render_png(list, options, file))
-}
-
-/// A value of an option with its name and help.
-type Choice<T> = (&'static str, &'static str, T);
-
-/// Parser of an option that takes one of some names, each with its help and its value.
-fn choice<T: Clone + Send + Sync + 'static>(
-    choices: &'static [Choice<T>],
-) -> impl TypedValueParser<Value = T> {
-    let names = choices.iter();
-    let names = names.map(|(name, help, _)| PossibleValue::new(*name).help(*help));
-    PossibleValuesParser::new(names).try_map(|chosen: String| {
-        let found = choices.iter().find(|(name, ..)| *name == chosen);
-        found.map(|choice| choice.2.clone()).ok_or("no such choice")
-    })
-}
-
-/// Prints a summary, as JSON if that is asked for.
-fn show(json: bool, summary: &(impl Serialize + Display)) -> CliResult {
-    match json {
-        true => println!("{}", serde_json::to_string_pretty(summary)?),
-        false => println!("{summary}"),
-    }
-    Ok(())
-}
-
-/// Number of processors.
-fn processors() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
 }

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use super::dds_replay::{DdsReplay, param, quoted};
 use super::node_process::NodeProcess;
 use super::params::CAMERA_NODE;
-use super::processes::{DdsReplay, param, quoted};
 use crate::CliResult;
 use lattice_nodes::replay::{CameraInput, CameraReport, DepthCamera, QUEUE_SIZE};
 use lattice_nodes::semantic_cloud::CloudReport;

@@ -1,25 +1,26 @@
 //! `lattice replay`: maps from a log.
 
+mod arguments;
 mod check;
+mod dds_replay;
 mod depth;
+mod map_files;
 pub mod node_process;
 mod params;
 mod processes;
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use clap::Args;
-use lattice_core::lattice::{Lattice, LatticeKind, Orientation};
+use lattice_core::lattice::Lattice;
 use lattice_core::voxels::file::WriteOptions;
 
-use super::cell_size::CellSize;
 use super::progress::Progress;
 use super::{CliResult, Lattices, fleet, init_logging};
+pub use arguments::Replay;
 pub use check::{Better, CHECK_POINTS, CHECK_S, WRONG_S};
 use lattice_bag::BagReader;
 use lattice_nodes::enu_transformer::TransformerOptions;
-use lattice_nodes::enu_transformer::ins::InsSource;
 use lattice_nodes::files::atomic_write;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::{
@@ -27,77 +28,12 @@ use lattice_nodes::replay::{
 };
 use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_runtime::LoopbackDomain;
+pub use map_files::map_file;
 use processes::DdsReplay;
 pub use processes::{param, quoted, yaml_text};
 
 /// Participants on loopback beside the player and the transformer: a lattice needs two of them, a depth camera one.
 const MAX_LOOPBACK_NODES: usize = 10;
-
-/// Map a rosbag2 log
-#[derive(Args, Clone, Debug, Default)]
-pub struct Replay {
-    /// rosbag2 directory, one mcap or db3 file of it, or a ROS 1 bag
-    pub bag: PathBuf,
-    /// Run the nodes' state machines in this process, as fast as possible, instead of playing
-    /// the log over DDS to one process per node
-    #[arg(long)]
-    pub direct: bool,
-    /// cubic, bcc, fcc, mcc, hex, hexopt, several separated by commas, paper, or all; by default from the parameters
-    #[arg(long)]
-    pub lattice: Option<Lattices>,
-    #[command(flatten)]
-    pub cells: CellSize,
-    /// Orientation of the cells: paper, ground (flattest), or a crystal direction that points up, such as
-    /// 110-up; by default from the parameters (paper)
-    #[arg(long)]
-    pub orientation: Option<Orientation>,
-    /// Parameter files of the nodes; later ones override earlier ones
-    #[arg(long = "params", value_name = "FILE")]
-    pub params: Vec<PathBuf>,
-    /// One parameter, as in `-p ins.source:=odometry`
-    #[arg(short = 'p', long = "param", value_name = "NAME:=VALUE")]
-    pub param: Vec<String>,
-    /// Topics of clouds or depth images; by default detected in the log
-    #[arg(long, value_name = "TOPIC")]
-    pub points: Vec<String>,
-    /// Source of poses: odometry, inspvax, inspva, navsatfix_imu, pose, pose_with_covariance, or tf (transforms
-    /// only); by default detected in the log, in this order
-    #[arg(long)]
-    pub ins: Option<InsSource>,
-    /// Topic of the INS; by default detected in the log
-    #[arg(long, value_name = "TOPIC")]
-    pub ins_topic: Option<String>,
-    /// Threads of the direct replay; 0: all cores
-    #[arg(long, default_value_t = 0)]
-    pub threads: usize,
-    /// Playback rate over DDS, 1 is real time
-    #[arg(long, default_value_t = 1.0)]
-    pub rate: f64,
-    /// Map only clouds from this time on, s of log time from its beginning; needs --direct
-    #[arg(long, value_name = "SECONDS")]
-    pub start: Option<f64>,
-    /// Map only clouds before this time, s of log time from its beginning; needs --direct
-    #[arg(long, value_name = "SECONDS")]
-    pub stop: Option<f64>,
-    /// File for the map, for `lattice map`; with several lattices their names precede the extension
-    #[arg(long, value_name = "FILE")]
-    pub map_out: Option<PathBuf>,
-    /// Folder of tables to add the map to, for `lattice fleet`; needs --direct and the program lattice-fleet
-    #[arg(long, value_name = "DIR")]
-    pub out_table: Option<PathBuf>,
-    /// Map although the attitudes contradict the way of the machine
-    #[arg(long)]
-    pub trust_attitude: bool,
-    /// Map without the check of stamps and mounts against the poses, on the first minute
-    #[arg(long)]
-    pub trust_stamps: bool,
-    /// Print the report as JSON
-    #[arg(long)]
-    pub json: bool,
-    /// Port of a viewer for one of the maps.
-    #[arg(skip)]
-    pub viewer: Option<u16>,
-}
 
 impl Replay {
     /// Replay of a log in this process with default parameters, which writes the map.
@@ -341,18 +277,6 @@ impl Replay {
             ..TopicWishes::default()
         })
     }
-}
-
-/// Map file of a lattice; with several its name precedes the extension.
-pub fn map_file(path: &Path, kind: LatticeKind, several: bool) -> PathBuf {
-    let mut path = path.to_owned();
-    if several {
-        let ending = path.extension().unwrap_or_default().to_owned();
-        path.set_extension(kind.name());
-        path.as_mut_os_string().push(".");
-        path.as_mut_os_string().push(ending);
-    }
-    path
 }
 
 /// Writes the map of each mapper.

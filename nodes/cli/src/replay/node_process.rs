@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
 
-use super::processes::{DdsReplay, param, yaml_text};
+use super::dds_replay::{DdsReplay, param, yaml_text};
 use crate::CliResult;
 use lattice_nodes::report;
 use lattice_runtime::LoopbackDomain;

@@ -8,29 +8,14 @@ use std::time::Instant;
 
 use lattice_core::lattice::{Lattice, LatticeKind};
 
+pub use super::dds_replay::{DdsReplay, param, quoted, yaml_text};
 use super::depth;
+use super::map_file;
 use super::node_process::{NodeProcess, warn_of_short_buffer};
-use super::{Replay, map_file};
 use crate::CliResult;
 use crate::progress::Progress;
-use lattice_bag::BagReader;
 use lattice_nodes::files::atomic_write;
-use lattice_nodes::replay::{LatticeReport, Role, RunReport, TopicPlan};
-use lattice_runtime::LoopbackDomain;
-
-/// A replay over DDS.
-pub struct DdsReplay<'a> {
-    /// Options of the command.
-    pub options: &'a Replay,
-    /// The log.
-    pub reader: &'a BagReader,
-    /// Roles of its topics.
-    pub plan: &'a TopicPlan,
-    /// Lattices, one map each.
-    pub lattices: Vec<Lattice>,
-    /// Domain of the processes.
-    pub domain: LoopbackDomain,
-}
+use lattice_nodes::replay::{LatticeReport, Role, RunReport};
 
 /// Plays the log through separate processes and collects their reports.
 pub fn run(replay: &DdsReplay) -> CliResult<RunReport> {
@@ -217,22 +202,6 @@ impl DdsReplay<'_> {
 /// File name of the saved map of a lattice.
 fn saved_map(name: &str) -> String {
     format!("{name}.lattice")
-}
-
-/// Parameter in the form of `-p`.
-pub fn param(name: &str, value: &str) -> String {
-    format!("{name}:={value}")
-}
-
-/// Path as YAML text.
-pub fn yaml_text(path: &Path) -> String {
-    format!("'{}'", path.display().to_string().replace('\'', "''"))
-}
-
-/// Names as a YAML list.
-pub fn quoted(names: &[&str]) -> String {
-    let names: Vec<String> = names.iter().map(|name| format!("'{name}'")).collect();
-    format!("[{}]", names.join(", "))
 }
 
 /// One map with its markers.

@@ -1,13 +1,12 @@
 //! `lattice paper`: the papers behind this library, computed anew.
 
 mod calibration;
+mod report_options;
 mod voxels;
 
-use crate::progress::Progress;
 use crate::{CliResult, init_logging};
-use clap::{Args, Subcommand};
-use lattice_lab::{Report, write_report};
-use std::path::PathBuf;
+use clap::Subcommand;
+use report_options::{ReportOptions, make};
 
 /// Compute every table and figure of a paper and set it beside what is printed
 #[derive(Subcommand)]
@@ -27,45 +26,4 @@ impl Paper {
             Self::Calibration(command) => command.run(),
         }
     }
-}
-
-/// Options of both papers.
-#[derive(Args)]
-struct ReportOptions {
-    /// Folder of the report: report.html, report.json, a CSV for each table, an SVG for each figure
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// The same seed gives the same bytes
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Print the report as JSON
-    #[arg(long)]
-    json: bool,
-}
-
-/// Computes a report behind a progress bar, writes it and says how each section stands.
-fn make<E: std::fmt::Display>(
-    options: &ReportOptions,
-    compute: impl FnOnce(&mut dyn FnMut(f64, &str)) -> Result<Report, E>,
-) -> CliResult {
-    let bar = Progress::new("paper");
-    let report = compute(&mut |done, what| {
-        bar.set(done);
-        bar.say(what);
-    });
-    bar.done();
-    let report = report.map_err(|e| e.to_string())?;
-    write_report(&report, &options.out)?;
-    if options.json {
-        println!("{}", serde_json::to_string_pretty(&report)?);
-        return Ok(());
-    }
-    for section in report.sections() {
-        println!("{:<68} {}", section.title, section.verdict.name());
-    }
-    for (section, check) in report.failing() {
-        println!("fails: {}: {}", section.id, check.name);
-    }
-    println!("written to {}", options.out.join("report.html").display());
-    Ok(())
 }
