@@ -1,13 +1,11 @@
-//! All messages of this crate, by type.
+//! All messages of this crate, by type; type hashes of these and of others that a program uses.
 
-use crate::interface::RosMessage;
-use crate::{
-    action, action_msgs, builtin_interfaces, calibration, diagnostic_msgs, geographic_msgs,
-    geometry_msgs, headset, lattice, lifecycle_msgs, livox_interfaces, livox_ros_driver,
-    livox_ros_driver2, map_msgs, nav_msgs, novatel_oem7_msgs, octomap_msgs, rcl_interfaces,
-    rmw_dds_common, rosbag2_interfaces, rosgraph_msgs, sensor_msgs, std_msgs, std_srvs, tf2_msgs,
-    type_description_interfaces, unique_identifier_msgs, vision_msgs, visualization_msgs,
-};
+use std::collections::HashMap;
+use std::sync::{LazyLock, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+use crate::interface::{RosMessage, RosService, Schema};
+use crate::type_hash::{service_hash, type_hash};
+use crate::{rmw_dds_common, visit_packages};
 
 /// Visitor of every message type; see [`visit_messages`].
 pub trait MessageVisitor {
@@ -17,42 +15,8 @@ pub trait MessageVisitor {
 
 /// Passes every message, and every part of a service or an action, to the visitor.
 pub fn visit_messages(visitor: &mut impl MessageVisitor) {
-    action_msgs::visit_messages(visitor);
-    action_msgs::visit_services(visitor);
-    builtin_interfaces::visit_messages(visitor);
-    calibration::visit_messages(visitor);
-    calibration::visit_services(visitor);
-    action::visit_parts(visitor);
-    diagnostic_msgs::visit_messages(visitor);
-    geographic_msgs::visit_messages(visitor);
-    geometry_msgs::visit_messages(visitor);
-    headset::visit_messages(visitor);
-    lattice::visit_messages(visitor);
-    lattice::visit_services(visitor);
-    lifecycle_msgs::visit_messages(visitor);
-    lifecycle_msgs::visit_services(visitor);
-    livox_interfaces::visit_messages(visitor);
-    livox_ros_driver::visit_messages(visitor);
-    livox_ros_driver2::visit_messages(visitor);
-    map_msgs::visit_messages(visitor);
-    nav_msgs::visit_messages(visitor);
-    novatel_oem7_msgs::visit_messages(visitor);
-    octomap_msgs::visit_messages(visitor);
-    octomap_msgs::visit_services(visitor);
-    rcl_interfaces::visit_messages(visitor);
-    rcl_interfaces::visit_services(visitor);
+    visit_packages(visitor);
     rmw_dds_common::visit_messages(visitor);
-    rosbag2_interfaces::visit_services(visitor);
-    rosgraph_msgs::visit_messages(visitor);
-    sensor_msgs::visit_messages(visitor);
-    std_msgs::visit_messages(visitor);
-    std_srvs::visit_services(visitor);
-    tf2_msgs::visit_messages(visitor);
-    type_description_interfaces::visit_messages(visitor);
-    type_description_interfaces::visit_services(visitor);
-    unique_identifier_msgs::visit_messages(visitor);
-    vision_msgs::visit_messages(visitor);
-    visualization_msgs::visit_messages(visitor);
 }
 
 /// Definition of a message of this crate with its dependencies (`ros2msg` text).
@@ -76,6 +40,118 @@ pub fn definition_of(ros_type: &str) -> Option<String> {
     find.1
 }
 
+/// Type hash of a message or service of this crate, of a part of an action, or of a type made known.
+pub fn hash_of(ros_type: &str) -> Option<&'static str> {
+    known(ros_type).map(|known| known.hash)
+}
+
+/// Schema of a message of this crate, of a part of a service or an action, or of a message made known.
+pub fn schema_of(ros_type: &str) -> Option<&'static Schema> {
+    known(ros_type).and_then(|known| known.schema)
+}
+
+/// Makes a message of another crate known to [`hash_of`] and [`schema_of`], with those in its fields.
+///
+/// Publishers and subscriptions of `lattice_runtime` do so.
+pub fn know_message<M: RosMessage>() {
+    if known(M::TYPE).is_none() {
+        KNOWN.write().add_message(M::SCHEMA);
+    }
+}
+
+/// Makes a service of another crate known to [`hash_of`], and its request and response as [`know_message`].
+pub fn know_service<S: RosService>() {
+    if known(S::TYPE).is_none() {
+        let mut known = KNOWN.write();
+        known.add_message(S::Request::SCHEMA);
+        known.add_message(S::Response::SCHEMA);
+        known.add_service(S::TYPE, S::Request::SCHEMA, S::Response::SCHEMA);
+    }
+}
+
+fn known(ros_type: &str) -> Option<Known> {
+    KNOWN.read().0.get(ros_type).copied()
+}
+
+static KNOWN: LazyLock<Lock> = LazyLock::new(|| {
+    let mut types = Types::default();
+    visit_messages(&mut types);
+    types.add_services();
+    Lock(RwLock::new(types))
+});
+
+/// Types by name; what a panic left is taken as it is, since entries are only added.
+struct Lock(RwLock<Types>);
+
+impl Lock {
+    fn read(&self) -> RwLockReadGuard<'_, Types> {
+        self.0.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn write(&self) -> RwLockWriteGuard<'_, Types> {
+        self.0.write().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Hash of a type; a service has no schema of its own.
+#[derive(Clone, Copy)]
+struct Known {
+    hash: &'static str,
+    schema: Option<&'static Schema>,
+}
+
+/// Known types by name. They stay as long as the process, as their schemas do.
+#[derive(Default)]
+struct Types(HashMap<&'static str, Known>);
+
+impl Types {
+    fn add(&mut self, name: &'static str, hash: Option<String>, schema: Option<&'static Schema>) {
+        if let Some(hash) = hash {
+            let hash = hash.leak();
+            self.0.entry(name).or_insert(Known { hash, schema });
+        }
+    }
+
+    /// Adds a message, and those in its fields that are new.
+    fn add_message(&mut self, schema: &'static Schema) {
+        if !self.0.contains_key(schema.type_name) {
+            let hash = type_hash(schema.type_name, &schema.definition());
+            self.add(schema.type_name, hash, Some(schema));
+            for dependency in schema.dependencies {
+                self.add_message(dependency);
+            }
+        }
+    }
+
+    fn add_service(
+        &mut self,
+        name: &'static str,
+        request: &'static Schema,
+        response: &'static Schema,
+    ) {
+        self.add(name, service_hash(name, request, response), None);
+    }
+
+    /// Adds the services whose requests and responses are here.
+    fn add_services(&mut self) {
+        let schema = |name: &str| self.0.get(name)?.schema;
+        let service = |request: &&'static str| {
+            let name = request.strip_suffix("_Request")?;
+            Some((name, schema(request)?, schema(&format!("{name}_Response"))?))
+        };
+        let services: Vec<_> = self.0.keys().filter_map(service).collect();
+        for (name, request, response) in services {
+            self.add_service(name, request, response);
+        }
+    }
+}
+
+impl MessageVisitor for Types {
+    fn visit<M: RosMessage>(&mut self) {
+        self.add_message(M::SCHEMA);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
@@ -97,31 +173,5 @@ mod tests {
         visit_messages(&mut names);
         let unique: BTreeSet<_> = names.0.iter().collect();
         assert_eq!(unique.len(), names.0.len());
-    }
-
-    #[test]
-    fn every_definition_file_belongs_to_a_message() {
-        let mut names = Names::default();
-        visit_messages(&mut names);
-        let root = env!("CARGO_MANIFEST_DIR");
-        let mut folders: Vec<_> = ["msg", "srv", "action"]
-            .map(|kind| (format!("{root}/{kind}"), "lattice_msgs".to_owned()))
-            .into();
-        for folder in std::fs::read_dir(format!("{root}/definitions")).unwrap() {
-            let folder = folder.unwrap();
-            let package = folder.file_name().into_string().unwrap();
-            folders.push((folder.path().display().to_string(), package));
-        }
-        for (folder, package) in folders {
-            for file in std::fs::read_dir(folder).unwrap() {
-                let file = file.unwrap().file_name().into_string().unwrap();
-                let type_name = match file.split_once('.').unwrap() {
-                    (name, "msg") => format!("{package}/msg/{name}"),
-                    (name, "action") => format!("{package}/action/{name}_Goal"),
-                    (name, _) => format!("{package}/srv/{name}_Request"),
-                };
-                assert!(names.0.contains(&type_name.as_str()), "{type_name}");
-            }
-        }
     }
 }

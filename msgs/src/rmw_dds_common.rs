@@ -4,14 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::interface::messages;
-
-messages! {
-    "rmw_dds_common" in "../definitions/rmw_dds_common/";
-    Gid [];
-    NodeEntitiesInfo [Gid];
-    ParticipantEntitiesInfo [Gid, NodeEntitiesInfo];
-}
+use crate::{MessageVisitor, RosMessage, Schema};
 
 /// GID of an endpoint or a participant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -40,4 +33,26 @@ pub struct ParticipantEntitiesInfo<G = Gid> {
     pub gid: G,
     /// Nodes of the participant.
     pub node_entities_info_seq: Vec<NodeEntitiesInfo<G>>,
+}
+
+macro_rules! messages {
+    ($($name:ident [$($dependency:ident),*];)*) => {
+        $(impl RosMessage for $name {
+            const SCHEMA: &'static Schema = &Schema {
+                type_name: concat!("rmw_dds_common/msg/", stringify!($name)),
+                text: include_str!(concat!("../definitions/rmw_dds_common/", stringify!($name), ".msg")),
+                dependencies: &[$(<$dependency as RosMessage>::SCHEMA),*],
+            };
+        })*
+
+        pub(crate) fn visit_messages(visitor: &mut impl MessageVisitor) {
+            $(visitor.visit::<$name>();)*
+        }
+    };
+}
+
+messages! {
+    Gid [];
+    NodeEntitiesInfo [Gid];
+    ParticipantEntitiesInfo [Gid, NodeEntitiesInfo];
 }

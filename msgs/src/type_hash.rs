@@ -2,16 +2,15 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
-use std::sync::LazyLock;
 
 use hmac_sha256::Hash;
 
+use crate::RosMessage;
 use crate::builtin_interfaces::Time;
 use crate::interface::Schema;
 use crate::type_description_interfaces::{
     Field, FieldType, IndividualTypeDescription, TypeDescription,
 };
-use crate::{MessageVisitor, RosMessage, visit_messages};
 
 /// Type hash (`RIHS01_...`) of a message by its definition with all dependencies (`ros2msg` text).
 ///
@@ -57,49 +56,11 @@ pub fn type_description(ros_type: &str, definition: &str) -> Option<TypeDescript
     })
 }
 
-/// Type hash of a message or service of this crate, or of a part of an action.
-pub fn hash_of(ros_type: &str) -> Option<&'static str> {
-    known(ros_type).map(|(hash, _)| hash)
-}
-
-/// Schema of a message of this crate, or of a part of a service or an action.
-pub fn schema_of(ros_type: &str) -> Option<&'static Schema> {
-    known(ros_type).and_then(|(_, schema)| schema)
-}
-
-fn known(ros_type: &str) -> Option<(&'static str, Option<&'static Schema>)> {
-    static HASHES: LazyLock<Hashes> = LazyLock::new(|| {
-        let mut hashes = Hashes::default();
-        visit_messages(&mut hashes);
-        hashes.add_services();
-        hashes
-    });
-    let found = HASHES.0.get(ros_type);
-    found.map(|(hash, schema)| (hash.as_str(), *schema))
-}
-
-/// Hashes by type name. A service has no schema of its own.
-#[derive(Default)]
-struct Hashes(HashMap<&'static str, (String, Option<&'static Schema>)>);
-
-impl Hashes {
-    /// Adds the services whose requests and responses are here.
-    fn add_services(&mut self) {
-        let schema = |name: &str| self.0.get(name)?.1;
-        let service = |request: &&'static str| {
-            let name = request.strip_suffix("_Request")?;
-            let parts = (schema(request)?, schema(&format!("{name}_Response"))?);
-            Some((name, (service_hash(name, parts)?, None)))
-        };
-        let services: Vec<_> = self.0.keys().filter_map(service).collect();
-        self.0.extend(services);
-    }
-}
-
 /// Type hash of a service: rosidl describes it as a message of its request, response and event.
-fn service_hash(
+pub(crate) fn service_hash(
     service: &str,
-    (request, response): (&'static Schema, &'static Schema),
+    request: &'static Schema,
+    response: &'static Schema,
 ) -> Option<String> {
     let (_, name) = service.rsplit_once('/')?;
     let mut definition = format!(
@@ -123,14 +84,6 @@ fn service_hash(
 /// Fields of service_msgs/msg/ServiceEventInfo.
 const SERVICE_EVENT_INFO: &str =
     "uint8 event_type\nbuiltin_interfaces/Time stamp\nchar[16] client_gid\nint64 sequence_number\n";
-
-impl MessageVisitor for Hashes {
-    fn visit<M: RosMessage>(&mut self) {
-        let hash = type_hash(M::TYPE, &M::definition());
-        self.0
-            .extend(hash.map(|hash| (M::TYPE, (hash, Some(M::SCHEMA)))));
-    }
-}
 
 /// Full name of a message that a definition calls `Name` or `package/Name`.
 ///
@@ -270,6 +223,7 @@ fn is_plain(name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{MessageVisitor, hash_of, visit_messages};
 
     #[test]
     fn hashes_are_those_of_jazzy() {

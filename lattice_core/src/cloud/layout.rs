@@ -1,7 +1,7 @@
 //! Layout of the points of a cloud, and its validation.
 
-use super::view::Coordinates;
-use super::{CloudError, CloudView};
+use super::CloudError;
+use super::coordinates::Coordinates;
 
 pub(super) const MAX_FIELDS: usize = 256;
 /// Maximum length of a name repeated in an error.
@@ -144,32 +144,7 @@ impl Datatype {
 }
 
 impl CloudLayout {
-    /// Validates the layout against `data` and gives access to the points.
-    ///
-    /// Bytes after the last row are ignored. A cloud without points is accepted with any fields, since drivers send
-    /// it without them.
-    pub fn view<'a>(
-        &'a self,
-        data: &'a [u8],
-        limits: &CloudLimits,
-    ) -> Result<CloudView<'a>, CloudError> {
-        let points = u64::from(self.width) * u64::from(self.height);
-        if points == 0 {
-            return Ok(CloudView::empty());
-        }
-        let points = usize::try_from(points)
-            .ok()
-            .filter(|&n| n <= limits.max_points)
-            .ok_or(CloudError::TooManyPoints {
-                points,
-                max_points: limits.max_points,
-            })?;
-        self.check_extent(data.len())?;
-        self.check_fields()?;
-        Ok(CloudView::new(self, data, points, self.coordinates()?))
-    }
-
-    fn check_extent(&self, bytes: usize) -> Result<(), CloudError> {
+    pub(super) fn check_extent(&self, bytes: usize) -> Result<(), CloudError> {
         if self.point_step == 0 {
             return Err(CloudError::PointStep {
                 points: u64::from(self.width) * u64::from(self.height),
@@ -198,7 +173,7 @@ impl CloudLayout {
         Ok(())
     }
 
-    fn check_fields(&self) -> Result<(), CloudError> {
+    pub(super) fn check_fields(&self) -> Result<(), CloudError> {
         if self.fields.len() > MAX_FIELDS {
             return Err(CloudError::TooManyFields {
                 fields: self.fields.len(),
@@ -218,7 +193,7 @@ impl CloudLayout {
         Ok(())
     }
 
-    fn coordinates(&self) -> Result<Coordinates, CloudError> {
+    pub(super) fn coordinates(&self) -> Result<Coordinates, CloudError> {
         let [x, y, z] = [
             self.coordinate("x")?,
             self.coordinate("y")?,

@@ -4,6 +4,7 @@
 //! resulting [`CloudView`] reads points safely. [`transform_records`] transforms them to the map frame, each with the
 //! pose at its own time.
 
+mod coordinates;
 mod error;
 mod layout;
 mod mend;

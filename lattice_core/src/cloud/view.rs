@@ -2,14 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::{CloudLayout, Datatype, PointField};
-
-/// Offsets of the coordinates in a point, and their type.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Coordinates {
-    pub offsets: [usize; 3],
-    pub wide: bool,
-}
+use super::coordinates::Coordinates;
+use super::{CloudError, CloudLayout, CloudLimits, Datatype, PointField};
 
 /// View of a validated cloud: points by index, row by row, without copying.
 #[derive(Clone, Copy, Debug)]
@@ -179,4 +173,31 @@ fn number<const N: usize>(record: &[u8], offset: usize, parse: impl Fn([u8; N]) 
         .get(offset..)
         .and_then(|rest| rest.first_chunk::<N>());
     bytes.map_or(f64::NAN, |bytes| parse(*bytes))
+}
+
+impl CloudLayout {
+    /// Validates the layout against `data` and gives access to the points.
+    ///
+    /// Bytes after the last row are ignored. A cloud without points is accepted with any fields, since drivers send
+    /// it without them.
+    pub fn view<'a>(
+        &'a self,
+        data: &'a [u8],
+        limits: &CloudLimits,
+    ) -> Result<CloudView<'a>, CloudError> {
+        let points = u64::from(self.width) * u64::from(self.height);
+        if points == 0 {
+            return Ok(CloudView::empty());
+        }
+        let points = usize::try_from(points)
+            .ok()
+            .filter(|&n| n <= limits.max_points)
+            .ok_or(CloudError::TooManyPoints {
+                points,
+                max_points: limits.max_points,
+            })?;
+        self.check_extent(data.len())?;
+        self.check_fields()?;
+        Ok(CloudView::new(self, data, points, self.coordinates()?))
+    }
 }

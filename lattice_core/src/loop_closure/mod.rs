@@ -9,6 +9,7 @@ mod corrections;
 mod history;
 mod pose_graph;
 mod segment;
+mod stamps;
 #[cfg(test)]
 mod tests;
 mod verify;
@@ -25,6 +26,7 @@ pub use segment::{Segment, SegmentCutter};
 use crate::lattice::LatticeError;
 use crate::pose::se3;
 use crate::registration::Verdict as RegistrationVerdict;
+pub use stamps::middle_ns;
 use verify::register_segments;
 
 /// Distance within which two segments share enough surfaces, in RMS ranges of their points.
@@ -324,11 +326,6 @@ impl LoopCloser {
         }
         Corrections::new(anchors)
     }
-}
-
-/// Midpoint of two times, ns.
-pub fn middle_ns(from_ns: i64, to_ns: i64) -> i64 {
-    from_ns.saturating_add(to_ns.saturating_sub(from_ns) / 2)
 }
 
 /// Motion between the anchors of two segments, with the covariance of its twist in the frame of the first one.

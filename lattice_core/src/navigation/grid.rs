@@ -2,9 +2,7 @@
 
 use super::ProjectionError;
 use super::columns::Column;
-
-/// Maximum number of cells of a grid.
-pub const MAX_GRID_CELLS: u64 = 1 << 26;
+pub use super::grid_limit::MAX_GRID_CELLS;
 
 /// State of a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -20,6 +20,7 @@ mod cells;
 mod columns;
 mod flat;
 mod grid;
+mod grid_limit;
 mod options;
 mod reach;
 mod surfaces;

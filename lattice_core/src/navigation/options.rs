@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::grid::MAX_GRID_CELLS;
+use super::grid_limit::MAX_GRID_CELLS;
 use crate::lattice::Lattice;
 
 /// Bounds of the resolution, in cell sizes of the lattice.

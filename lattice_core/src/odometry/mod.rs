@@ -10,6 +10,8 @@ mod moment_map;
 mod moments;
 mod motion;
 mod sampling;
+mod scan;
+mod scan_result;
 mod submap;
 mod surface;
 mod sweep;
@@ -26,9 +28,10 @@ pub use sampling::Sizes;
 pub use sweep::AngularRate;
 pub use verdict::{LostCause, Verdict, WeakDirection};
 
-use crate::cloud::NO_TIME_NS;
 use crate::lattice::{LatticeError, LatticeKind};
 use align::Held;
+pub use scan::Scan;
+pub use scan_result::ScanResult;
 use submap::Submap;
 use sweep::Sweep;
 use verdict::{Evidence, can_begin, judge, least_contrast};
@@ -48,71 +51,6 @@ impl Default for OdometryOptions {
     fn default() -> OdometryOptions {
         OdometryOptions {
             lattice: LatticeKind::Fcc,
-        }
-    }
-}
-
-/// Scan in the frame of the base.
-#[derive(Clone, Copy, Debug)]
-pub struct Scan<'a> {
-    /// Points, metres.
-    pub points_m: &'a [Vector3<f64>],
-    /// Time of each point, ns; `None` if all are measured at the stamp.
-    pub times_ns: Option<&'a [i64]>,
-    /// Stamp, ns.
-    pub stamp_ns: i64,
-}
-
-impl Scan<'_> {
-    /// Times of the first and the last point, ns; the stamp without times.
-    pub fn span_ns(&self) -> (i64, i64) {
-        let times = self.times_ns.into_iter().flatten().copied();
-        let known = times.filter(|time| *time != NO_TIME_NS);
-        let span = known.fold(None, |span: Option<(i64, i64)>, time| {
-            let (first, last) = span.unwrap_or((time, time));
-            Some((first.min(time), last.max(time)))
-        });
-        span.unwrap_or((self.stamp_ns, self.stamp_ns))
-    }
-}
-
-/// Result for a scan.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct ScanResult {
-    /// Time of the first point, ns.
-    pub first_ns: i64,
-    /// Pose of the base at that time.
-    pub odom_from_first: Isometry3<f64>,
-    /// Time of the last point, ns.
-    pub end_ns: i64,
-    /// Pose of the base at that time.
-    pub odom_from_base: Isometry3<f64>,
-    /// Covariance of a perturbation (translation, rotation) in the axes of `odom` about the base since the beginning of
-    /// the submap, m^2, m rad and rad^2.
-    pub covariance: Matrix6<f64>,
-    /// Part of the covariance that grows along the path: that of the pose of the map around the base.
-    pub drift: Matrix6<f64>,
-    /// Verdict on the pose.
-    pub verdict: Verdict,
-    /// Number of the submap, from 0. The relative pose of two submaps is unknown.
-    pub submap: u32,
-    /// Inlier fraction of the registered points.
-    pub overlap: f64,
-    /// Number of registered points.
-    pub points: usize,
-    /// Contrast of the weakest direction: standard deviations by which the map explains the scan better at its pose
-    /// than a cell size away.
-    pub contrast: f64,
-}
-
-impl ScanResult {
-    /// Result with the pose at the time of the first point.
-    pub fn at_first(&self) -> ScanResult {
-        ScanResult {
-            end_ns: self.first_ns,
-            odom_from_base: self.odom_from_first,
-            ..self.clone()
         }
     }
 }

@@ -9,6 +9,7 @@ mod axes;
 mod buffer;
 mod frame_name;
 mod interpolate;
+mod pose_miss;
 pub mod se3;
 mod tf_error;
 mod track;

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::buffer::seconds;
+use super::pose_miss::seconds;
 
 /// Reason that a transform is refused.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]

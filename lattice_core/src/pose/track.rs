@@ -3,8 +3,8 @@
 use nalgebra::Isometry3;
 use std::collections::VecDeque;
 
-use super::PoseMiss;
 use super::interpolate::{interpolate, is_rigid};
+use super::pose_miss::PoseMiss;
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Track {

@@ -2,14 +2,13 @@
 
 use rustc_hash::FxHashSet;
 
+use super::Segment;
 use super::clearance::cell_distance_m;
+use super::limits::MAX_ROBOT_CELLS;
+use super::path_error::PathError;
 use super::shells::{add, steps_within};
-use super::{PathError, Segment};
 use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
-
-/// Maximum number of cells that a robot covers.
-pub const MAX_ROBOT_CELLS: usize = 1 << 16;
 
 pub(super) struct Corridor {
     /// Cells that touch the ball at the centre of cell 0, nearest first.

@@ -12,8 +12,11 @@ mod clearance;
 mod corridor;
 mod error;
 mod gjk;
+mod limits;
+mod map_query;
 mod nearest;
 mod path;
+mod path_error;
 mod search;
 mod segment;
 mod shells;
@@ -28,50 +31,17 @@ use crate::voxels::VoxelStore;
 
 pub use center_tree::PreparedNearest;
 pub use clearance::Clearance;
-pub use corridor::MAX_ROBOT_CELLS;
 pub use error::QueryError;
+pub use limits::MAX_ROBOT_CELLS;
 pub use nearest::Neighbor;
 pub use path::{Bounds, Path, PathError, PathOptions, Steps};
 pub use segment::Segment;
 pub use shells::Shells;
 
+pub use limits::MAX_COORDINATE_M;
+pub use map_query::Query;
 use search::Search;
 use tree::Tree;
-
-/// Maximum coordinate and distance, metres: a thousand times the largest map.
-pub const MAX_COORDINATE_M: f64 = 1e12;
-
-/// Queries of one state of a store.
-///
-/// Points near the surface are resolved by probing cells in order of distance. The first query that this cannot
-/// resolve sorts the keys (8 bytes each, kept). Later ones search the octree of the sorted Morton keys in logarithmic
-/// time.
-///
-/// ```
-/// use lattice_core::cloud::Cloud;
-/// use lattice_core::lattice::{Lattice, LatticeKind};
-/// use lattice_core::nalgebra::Vector3;
-/// use lattice_core::query::{Query, Segment};
-/// use lattice_core::voxels::VoxelList;
-///
-/// let lattice = Lattice::new(LatticeKind::Cubic, 1.0)?;
-/// let mut map = VoxelList::new(lattice, Vector3::zeros(), 1000)?;
-/// map.insert(&Cloud::from_points(0, Vector3::zeros(), &[Vector3::zeros()]));
-///
-/// let query = Query::new(&map);
-/// let point_m = Vector3::new(2.0, 0.0, 0.0);
-/// assert_eq!(query.nearest(&point_m, 1)?[0].distance_m, 2.0); // to the centre
-/// let clearance = query.clearance(&Segment::point(point_m), 10.0)?;
-/// assert_eq!(clearance.map(|found| found.distance_m), Some(1.5)); // to the cube
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub struct Query<'a, S> {
-    store: &'a S,
-    shells: Arc<Shells>,
-    tree: OnceLock<Tree>,
-    /// See [`Query::prepare_nearest`]; `None` if the cells exceed 32-bit indices.
-    prepared: OnceLock<Option<PreparedNearest>>,
-}
 
 impl<'a, S: VoxelStore> Query<'a, S> {
     /// Creates queries of the current state of `store`.

@@ -6,9 +6,7 @@ use std::collections::BTreeSet;
 
 use crate::shape::filled;
 use lattice_msgs::type_description_interfaces::GetTypeDescriptionRequest;
-use lattice_msgs::{
-    MessageVisitor, RosMessage, Schema, geometry_msgs, sensor_msgs, visit_messages,
-};
+use lattice_msgs::{MessageVisitor, RosMessage, geometry_msgs, sensor_msgs, visit_messages};
 
 /// A line of a definition: a constant, or a field that may have a default.
 struct Line<'a> {
@@ -100,75 +98,6 @@ fn fields_agree_in_name_type_and_order() {
     let mut fields = FieldsAgree(0);
     visit_messages(&mut fields);
     assert!(fields.0 > 60, "{} messages", fields.0);
-}
-
-/// `(struct, type, name, value)` of every constant in a source file.
-fn constants_in_rust(source: &str) -> Vec<[String; 4]> {
-    let mut name = "";
-    let mut found = Vec::new();
-    for line in source.lines() {
-        if let Some(rest) = line.strip_prefix("impl ") {
-            name = rest.trim_end_matches(" {");
-        } else if let Some(constant) = line.strip_prefix("    pub const ") {
-            let (constant, rest) = constant.split_once(": ").unwrap();
-            let (kind, value) = rest.split_once(" = ").unwrap();
-            let value = value.trim_end_matches(';');
-            found.push([name, kind, constant, value].map(str::to_owned));
-        }
-    }
-    found
-}
-
-/// `(struct, type, name, value)` of every constant in a definition.
-fn constants_in_text(schema: &Schema) -> Vec<[String; 4]> {
-    let name = schema
-        .type_name
-        .rsplit('/')
-        .next()
-        .unwrap()
-        .replace('_', "");
-    lines(schema.text)
-        .filter_map(|line| {
-            let kind = match line.kind {
-                "byte" | "uint8" => "u8",
-                "int8" => "i8",
-                "uint16" => "u16",
-                "int32" => "i32",
-                "uint32" => "u32",
-                "uint64" => "u64",
-                "string" => "&'static str",
-                other => other,
-            };
-            Some([name.as_str(), kind, line.name, line.constant?].map(str::to_owned))
-        })
-        .collect()
-}
-
-#[derive(Default)]
-struct Constants(Vec<[String; 4]>);
-
-impl MessageVisitor for Constants {
-    fn visit<M: RosMessage>(&mut self) {
-        self.0.extend(constants_in_text(M::SCHEMA));
-    }
-}
-
-#[test]
-fn constants_agree() {
-    let mut in_text = Constants::default();
-    visit_messages(&mut in_text);
-    let mut in_text = in_text.0;
-    let mut in_rust = Vec::new();
-    for package in "action_msgs calibration diagnostic_msgs lattice lifecycle_msgs \
-                    novatel_oem7_msgs rcl_interfaces sensor_msgs visualization_msgs"
-        .split_whitespace()
-    {
-        let path = format!("{}/src/{package}.rs", env!("CARGO_MANIFEST_DIR"));
-        in_rust.extend(constants_in_rust(&std::fs::read_to_string(path).unwrap()));
-    }
-    in_text.sort();
-    in_rust.sort();
-    assert_eq!(in_rust, in_text);
 }
 
 #[derive(Default)]

@@ -174,6 +174,9 @@ fn init_logging() {
         .format_timestamp(None)
         .format_target(false)
         // Commands warn of short receive buffers only after a loss.
-        .filter_module("lattice_runtime::shared::status", log::LevelFilter::Error)
+        .filter_module(
+            "lattice_runtime::node::shared::status",
+            log::LevelFilter::Error,
+        )
         .try_init();
 }

@@ -6,12 +6,11 @@ use std::error::Error;
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use lattice_msgs::action::{
-    CalibrateFeedbackMessage, CalibrateGetResult, CalibrateGetResultRequest, CalibrateSendGoal,
-    CalibrateSendGoalRequest,
-};
 use lattice_msgs::action_msgs::GoalStatus;
-use lattice_msgs::calibration::{CalibrateAction, CalibrateFeedback, CalibrateResult};
+use lattice_msgs::lattice::{
+    CalibrateAction, CalibrateFeedback, CalibrateFeedbackMessage, CalibrateGetResult,
+    CalibrateGetResultRequest, CalibrateResult, CalibrateSendGoal, CalibrateSendGoalRequest,
+};
 use lattice_msgs::unique_identifier_msgs::UUID;
 use lattice_msgs::{RosService, cdr};
 use lattice_runtime::env::Network;

@@ -2,10 +2,10 @@
 
 use thiserror::Error;
 
-use super::env::EnvError;
-use super::names::NameError;
-use super::params::ParamError;
-use super::security::SecurityError;
+use crate::config::env::EnvError;
+use crate::config::names::NameError;
+use crate::config::params::ParamError;
+use crate::config::security::SecurityError;
 
 /// Reason why a runtime, a node or an endpoint cannot be made.
 #[derive(Debug, Error)]

@@ -1,8 +1,8 @@
 //! Calibration results as messages.
 
 use lattice_core::registration::{Calibration, DirectionKind, Verdict};
-use lattice_msgs::calibration::{CalibrationResult, ClassReliability, WeakDirection};
 use lattice_msgs::geometry_msgs::Vector3;
+use lattice_msgs::lattice::{CalibrationResult, ClassReliability, WeakDirection};
 use nalgebra::{Isometry3, Matrix6};
 
 use super::geometry::transform_stamped;

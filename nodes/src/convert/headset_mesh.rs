@@ -1,6 +1,6 @@
 //! Chunking of headset mesh surfaces for transmission.
 
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 
 /// Limit of array bytes per chunk, so that a message with its names has at most 60 kB.
 const CHUNK_BYTES: usize = 56_000;

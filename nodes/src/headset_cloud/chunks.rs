@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 
 use super::refusal::{MeshRefusal, shown};
 use super::session::MAX_DELAY_NS;

@@ -1,6 +1,6 @@
 //! Meshes received as markers.
 
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 use lattice_msgs::visualization_msgs::Marker;
 
 /// Prefix of the names of marker surfaces.

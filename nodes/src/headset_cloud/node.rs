@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use lattice_msgs::geometry_msgs::PoseStamped;
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 use lattice_msgs::sensor_msgs::{CameraInfo, Image, PointCloud2};
 use lattice_msgs::std_msgs;
 use lattice_msgs::tf2_msgs::TFMessage;

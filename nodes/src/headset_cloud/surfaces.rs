@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lattice_core::pose::Axes;
 use lattice_core::registration::UNLABELED;
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::chunks::{Chunks, StateTime};

@@ -271,7 +271,7 @@ mod tests {
                 let asked = PlanPathRequest {
                     radius_m,
                     tolerance_m,
-                    ..far.clone()
+                    ..far
                 };
                 assert!(!plan(&wall, &asked, || true).success, "{bad}");
             }

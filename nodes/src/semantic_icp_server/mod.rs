@@ -27,10 +27,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use lattice_core::registration::{Calibration, SourceCloud, Stage, TrackUpdate, Verdict};
-use lattice_msgs::calibration::{
-    CalibrateFeedback, CalibrateGoal, CalibrateResult, CalibrationResult,
-};
 use lattice_msgs::geometry_msgs::TransformStamped;
+use lattice_msgs::lattice::{CalibrateFeedback, CalibrateGoal, CalibrateResult, CalibrationResult};
 use lattice_msgs::std_msgs::String as StringMessage;
 use lattice_msgs::vision_msgs::LabelInfo;
 use nalgebra::Isometry3;

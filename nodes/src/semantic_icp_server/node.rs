@@ -5,11 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use lattice_msgs::calibration::{
+use lattice_msgs::lattice::{
     Calibrate, CalibrateAction, CalibrateGoal, CalibrateRequest, CalibrateResponse,
-    CalibrateResult, CalibrationResult,
+    CalibrateResult, CalibrationResult, LatticeMap, LatticeMapUpdate,
 };
-use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::{Empty, String as StringMessage};
 use lattice_msgs::vision_msgs::LabelInfo;

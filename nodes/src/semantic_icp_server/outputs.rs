@@ -1,6 +1,6 @@
 //! Publishers of the node.
 
-use lattice_msgs::calibration::CalibrationResult;
+use lattice_msgs::lattice::CalibrationResult;
 use lattice_msgs::std_msgs::Empty;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Node, Publisher, TfBroadcaster, TfGuard};

@@ -4,11 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use lattice_msgs::calibration::CalibrationResult;
 use lattice_msgs::cdr::CdrError;
 use lattice_msgs::diagnostic_msgs::DiagnosticArray;
 use lattice_msgs::geometry_msgs::TransformStamped;
-use lattice_msgs::lattice::LatticeMap;
+use lattice_msgs::lattice::{CalibrationResult, LatticeMap};
 use lattice_msgs::nav_msgs::Path;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;

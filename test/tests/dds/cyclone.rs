@@ -22,6 +22,7 @@ use lattice_runtime::ros_args::RosArgs;
 use lattice_test::clouds::{field, header, odometry};
 use lattice_test::data::shared;
 use lattice_test::domain::TestDomain;
+use lattice_test::my_msgs;
 use lattice_test::peer::{self, Nodes, params};
 use lattice_test::python::python;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
@@ -267,11 +268,16 @@ fn a_cyclone_peer_sees_the_type_hash_of_every_endpoint() {
     let raw = |topic, hash| node.raw_publisher(topic, "odd/msg/Odd", Some(hash), Qos::DEFAULT);
     let raw = [raw("/noted", &noted), raw("/wrong", "RIHS01_;enclave=/")];
     assert!(raw.iter().all(Result::is_ok));
+    let own = node.publisher::<my_msgs::Battery>("/battery", Qos::DEFAULT);
+    let recharge = node.service::<my_msgs::Recharge>("/recharge", |_| Default::default());
+    assert!(own.is_ok() && recharge.is_ok());
     let topics = [
         "ros_discovery_info",
         "rt/voxel_map",
         "rt/points_enu",
         "rt/wrong",
+        "rt/battery",
+        "rq/rechargeRequest",
         "rq/lattice_mapper/queryRequest",
         "rr/lattice_mapper/queryReply",
         "rq/lattice_mapper/set_parametersRequest",

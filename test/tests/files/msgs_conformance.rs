@@ -4,8 +4,12 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use lattice_msgs::{MessageVisitor, RosMessage, cdr, hash_of, visit_messages};
+use lattice_msgs::{
+    MessageVisitor, RosAction, RosMessage, RosService, cdr, hash_of, know_message, know_service,
+    type_hash, visit_messages,
+};
 use lattice_test::data::shared;
+use lattice_test::my_msgs::{self, Battery, Beat, Cell, Recharge, SwapAction};
 use lattice_test::python::{python, script};
 use serde_json::{Value, json};
 
@@ -74,11 +78,17 @@ impl<I: Iterator<Item = Value>> MessageVisitor for Compare<I> {
     }
 }
 
+/// Passes our messages and those of a user's package.
+fn visit_all(visitor: &mut impl MessageVisitor) {
+    visit_messages(visitor);
+    my_msgs::visit_messages(visitor);
+}
+
 #[test]
 fn bytes_and_values_agree_with_rosbags() {
     let Some(python) = python() else { return };
     let mut questions = Questions::default();
-    visit_messages(&mut questions);
+    visit_all(&mut questions);
 
     let mut peer = Command::new(python)
         .arg(script("msgs_peer.py"))
@@ -105,7 +115,7 @@ fn bytes_and_values_agree_with_rosbags() {
         answers,
         in_jazzy: 0,
     };
-    visit_messages(&mut compare);
+    visit_all(&mut compare);
     assert!(compare.answers.next().is_none());
     assert!(
         compare.in_jazzy > 40,
@@ -137,4 +147,41 @@ fn type_hashes_agree_with_jazzy() {
         }
     }
     assert!(compared > 80, "only {compared} hashes compared");
+}
+
+#[test]
+fn messages_of_a_user_have_constants_defaults_and_hashes() {
+    assert_eq!(Battery::LI_ION, 1);
+    assert_eq!(Battery::MODEL, "4S #2");
+    assert_eq!(Battery::LOWEST_V, 3.0);
+    let battery = Battery::default();
+    assert_eq!(
+        (battery.volts, battery.type_, battery.charging),
+        (24.0, 1, true)
+    );
+    assert_eq!((battery.name.as_str(), battery.counts), ("main", [1, 2, 3]));
+    assert_eq!(battery.history, [0.0; 40]);
+
+    // Small messages of fixed size are Copy, and ordered without floating-point numbers.
+    let (cell, beat) = (Cell::default(), Beat::default());
+    let copies = [cell, cell];
+    assert_eq!(copies[0], cell);
+    assert!(beat <= Beat::default());
+
+    assert_eq!(hash_of(Battery::TYPE), None);
+    know_message::<Battery>();
+    know_service::<Recharge>();
+    let expected = type_hash(Battery::TYPE, &Battery::definition());
+    assert_eq!(hash_of(Battery::TYPE), expected.as_deref());
+    assert!(hash_of(Cell::TYPE).is_some() && hash_of(Recharge::TYPE).is_some());
+
+    let parts = [
+        <SwapAction as RosAction>::Goal::TYPE,
+        <<SwapAction as RosAction>::SendGoal as RosService>::Request::TYPE,
+        <SwapAction as RosAction>::FeedbackMessage::TYPE,
+    ];
+    assert_eq!(
+        parts.map(|part| part.strip_prefix("my_msgs/action/Swap_").unwrap()),
+        ["Goal", "SendGoal_Request", "FeedbackMessage"]
+    );
 }

@@ -84,7 +84,7 @@ fn declared() -> BTreeSet<String> {
             }
         }
     }
-    let status = code(&root().join("nodes/runtime/src/shared/status.rs"));
+    let status = code(&root().join("nodes/runtime/src/node/shared/status.rs"));
     for call in status.split("add(").skip(1) {
         found.extend(quoted(call.split(';').next().unwrap_or_default()));
     }

@@ -7,9 +7,10 @@ use serde_json::Value;
 use super::root;
 
 /// Every crate, and the crates of ours that it may use.
-const EDGES: [(&str, &str); 10] = [
+const EDGES: [(&str, &str); 11] = [
     ("lattice_core", ""),
-    ("lattice_msgs", ""),
+    ("lattice_msgs", "lattice_msgs_generator"),
+    ("lattice_msgs_generator", ""),
     ("lattice_bag", ""),
     ("lattice_cyclone_sys", ""),
     ("lattice_runtime", "lattice_cyclone_sys lattice_msgs"),
@@ -27,7 +28,7 @@ const EDGES: [(&str, &str); 10] = [
     ),
     (
         "lattice_test",
-        "lattice_bag lattice_core lattice_lab lattice_msgs lattice_nodes lattice_runtime",
+        "lattice_bag lattice_core lattice_lab lattice_msgs lattice_msgs_generator lattice_nodes lattice_runtime",
     ),
     ("lattice_test_ros2_client", "lattice_msgs lattice_runtime"),
 ];

@@ -2,6 +2,7 @@
 
 mod counters;
 mod crates;
+mod cycles;
 mod docs;
 mod launch;
 mod modules;
@@ -9,6 +10,7 @@ mod params;
 mod security;
 mod source;
 mod supply;
+mod tokens;
 mod words;
 
 use std::path::Path;

@@ -7,8 +7,8 @@ use std::path::Path;
 use super::root;
 use super::source::{code, files, module};
 
-/// Modules of crates in layers: each may use those before it in the list.
-const LAYERS: [(&str, &str); 3] = [
+/// Modules of crates and of folders in layers: each may use those before it in the list.
+const LAYERS: [(&str, &str); 8] = [
     (
         "lattice_core/src",
         "prefetch lattice kd_tree cloud geodesy pose voxels query raycast navigation registration odometry loop_closure",
@@ -20,17 +20,35 @@ const LAYERS: [(&str, &str); 3] = [
     ),
     (
         "nodes/runtime/src",
-        "sync names param_value params_file ros_args params security env logging qos error shutdown \
-         task_thread timer clock diagnostics loopback_domain remote port arrivals gaps confine cyclone rmw_zenoh peers output_types type_versions lifecycle_gate discovered_graph endpoints outbox \
-         graph local_bus publisher subscription service rosout shared node param_services \
-         logger_services type_description action tf_guard tf lifecycle process",
+        "sync shutdown task_thread config logging error transport graph communication node",
+    ),
+    (
+        "nodes/runtime/src/config",
+        "names param_value params_file ros_args params security env",
+    ),
+    (
+        "nodes/runtime/src/transport",
+        "confine loopback_domain qos remote port arrivals gaps outbox peers cyclone rmw_zenoh local_bus",
+    ),
+    (
+        "nodes/runtime/src/graph",
+        "discovered_graph output_types type_versions endpoints local_graph",
+    ),
+    (
+        "nodes/runtime/src/communication",
+        "lifecycle_gate service subscription publisher action",
+    ),
+    (
+        "nodes/runtime/src/node",
+        "clock diagnostics timer rosout shared expected logical_node node_services action_server param_services logger_services type_description lifecycle tf_guard tf process",
     ),
 ];
 
-/// First words after `crate::`, also in braces, and after as many `super::` as lead to the root.
-fn root_names(code: &str, depth: usize) -> BTreeSet<String> {
+/// First words after the path of a folder from the root of its crate, also in braces, and after as many
+/// `super::` as lead to that folder.
+fn root_names(code: &str, folder: &str, depth: usize) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
-    let prefixes = ["crate::".to_owned(), "super::".repeat(depth)];
+    let prefixes = [format!("crate::{folder}"), "super::".repeat(depth)];
     for prefix in prefixes.iter().filter(|prefix| !prefix.is_empty()) {
         for (at, _) in code.match_indices(prefix.as_str()) {
             // `super::super::` is also found in a longer chain, `crate::` in `$crate::`.
@@ -73,9 +91,14 @@ fn items(list: &str) -> Vec<String> {
     items
 }
 
-/// Names that the root of a crate brings up from its modules, with the module of each.
+/// Names that the root of a crate or folder brings up from its modules, with the module of each.
 fn reexports(source: &Path) -> Vec<(String, String)> {
-    let text = code(&source.join("lib.rs"));
+    let library = source.join("lib.rs");
+    let text = if library.exists() {
+        code(&library)
+    } else {
+        code(&source.join("mod.rs"))
+    };
     let mut found = Vec::new();
     for statement in text.split(';') {
         let Some((_, path)) = statement.split_once("pub use ") else {
@@ -96,6 +119,9 @@ fn reexports(source: &Path) -> Vec<(String, String)> {
 #[test]
 fn modules_point_one_way() {
     for (source, layers) in LAYERS {
+        let (_, folder) = source.split_once("/src").unwrap();
+        let folder = folder.split('/').skip(1).map(|name| format!("{name}::"));
+        let folder: String = folder.collect();
         let source = root().join(source);
         let layers: Vec<&str> = layers.split_whitespace().collect();
         let place = |name: &str| layers.iter().position(|layer| *layer == name);
@@ -112,7 +138,7 @@ fn modules_point_one_way() {
                 panic!("{here} is missing in the layers of {}", source.display())
             });
             seen.insert(here.clone());
-            for name in root_names(&code(&file), path.len()) {
+            for name in root_names(&code(&file), &folder, path.len()) {
                 let module = brought_up.iter().find(|(item, _)| *item == name);
                 let to = module.map_or(name.as_str(), |(_, module)| module);
                 if let Some(to_place) = place(to) {

@@ -5,13 +5,21 @@ use std::path::{Path, PathBuf};
 
 /// All `.rs` files below a directory, sorted; without those that cargo has built.
 pub fn files(directory: &Path) -> Vec<PathBuf> {
+    files_ending_in(&["rs"], directory)
+}
+
+/// Files with one of the endings below a directory, in order.
+pub fn files_ending_in(endings: &[&str], directory: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(directory).unwrap() {
         let path = entry.unwrap().path();
         // What cargo builds of a workspace of its own is none of its sources.
         if path.is_dir() && !path.ends_with("target") {
-            found.extend(files(&path));
-        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            found.extend(files_ending_in(endings, &path));
+        } else if path
+            .extension()
+            .is_some_and(|ending| endings.iter().any(|other| ending == *other))
+        {
             found.push(path);
         }
     }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::root;
-use super::source::files;
+use super::source::{files, files_ending_in};
 
 /// Longest sentence of a page, in words.
 const LONGEST_SENTENCE: usize = 40;
@@ -21,13 +21,14 @@ const SHORT: [(&str, usize); 2] = [
 ];
 
 /// Pages outside of the folders of pages.
-const FRONT: [&str; 8] = [
+const FRONT: [&str; 9] = [
     "README.md",
     "CONTRIBUTING.md",
     "RELEASING.md",
     "SECURITY.md",
     "lattice_core/README.md",
     "msgs/README.md",
+    "msgs/generator/README.md",
     "nodes/bag/README.md",
     "nodes/runtime/README.md",
 ];
@@ -160,6 +161,15 @@ fn comments(source: &str) -> Vec<(usize, Vec<&str>)> {
     found
 }
 
+/// Comments of a message, service or action with their lines, the marks left out.
+fn comments_of_definition(text: &str) -> Vec<(usize, Vec<&str>)> {
+    let lines = (1..).zip(text.lines());
+    let comments = lines.filter_map(|(number, line)| Some((number, line.split_once('#')?.1)));
+    comments
+        .map(|(number, comment)| (number, vec![comment.trim()]))
+        .collect()
+}
+
 /// True for a doc comment whose first sentence ends as none should.
 fn ends_badly(lines: &[&str]) -> bool {
     let paragraph = lines.iter().take_while(|line| !line.is_empty());
@@ -219,8 +229,16 @@ fn in_comments(
 ) -> (BTreeMap<String, usize>, Vec<String>) {
     let (mut counts, mut places) = (BTreeMap::new(), Vec::new());
     let folders = ["lattice_core", "msgs", "nodes", "test"].map(|folder| root().join(folder));
-    for path in folders.iter().flat_map(|folder| files(folder)) {
-        for (line, lines) in comments(&fs::read_to_string(&path).unwrap()) {
+    let sources = folders.iter().flat_map(|folder| files(folder));
+    // Comments of messages are documentation of their structs.
+    let definitions = files_ending_in(&["msg", "srv", "action"], &root().join("msgs"));
+    for path in sources.chain(definitions) {
+        let text = fs::read_to_string(&path).unwrap();
+        let found = match path.extension().is_some_and(|ending| ending == "rs") {
+            true => comments(&text),
+            false => comments_of_definition(&text),
+        };
+        for (line, lines) in found {
             for what in violations(&lines) {
                 *counts.entry(crate_of(&path)).or_default() += 1;
                 places.push(format!("{}:{line}: {what}", shown(&path)));
@@ -322,4 +340,7 @@ fn words_are_found() {
     assert_eq!(comments.len(), 2);
     assert!(ends_badly(&comments[0].1) && ends_badly(&comments[1].1));
     assert!(!ends_badly(&["At most four."]));
+    let comments = comments_of_definition("# Told.\nint32 a  # Metres, too.\n\nint32 b\n");
+    assert_eq!(comments.len(), 2);
+    assert!(ends_badly(&comments[1].1) && metaphors(comments[0].1[0]) == ["told"]);
 }

@@ -4,13 +4,11 @@ use std::sync::mpsc::channel;
 use std::thread;
 use std::time::Duration;
 
-use lattice_msgs::action::{
-    CalibrateFeedbackMessage, CalibrateGetResult, CalibrateGetResultRequest, CalibrateSendGoal,
-    CalibrateSendGoalRequest,
-};
 use lattice_msgs::action_msgs::{CancelGoal, CancelGoalRequest, GoalStatus, GoalStatusArray};
-use lattice_msgs::calibration::{
-    CalibrateAction, CalibrateFeedback, CalibrateGoal, CalibrateResult,
+use lattice_msgs::lattice::{
+    CalibrateAction, CalibrateFeedback, CalibrateFeedbackMessage, CalibrateGetResult,
+    CalibrateGetResultRequest, CalibrateGoal, CalibrateResult, CalibrateSendGoal,
+    CalibrateSendGoalRequest,
 };
 use lattice_msgs::unique_identifier_msgs::UUID;
 use lattice_runtime::qos::Qos;

@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::super::search::{Region, SearchSource, angle_between, search, yaw_of};
+use super::candidates::most_likely;
 use super::candidates::{COARSE_STEPS, Candidate, RegistrationContext};
-use super::most_likely;
 
 /// Number of alternatives among the candidates that are refined like the most likely one.
 const REFINED_ALTERNATIVES: usize = 4;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector3};
 
-use super::fit_diagnostics::FitDiagnostics;
+use super::diagnostics::FitDiagnostics;
 use super::margin::Margin;
 use crate::registration::Confusion;
 

@@ -299,3 +299,9 @@ impl<'a> RegistrationContext<'a> {
         (sum / points.len().max(1) as f64).into()
     }
 }
+
+/// Candidate with the largest total log-likelihood; the first of equal ones.
+pub(super) fn most_likely(all: &[Candidate]) -> Option<&Candidate> {
+    all.iter()
+        .reduce(|a, b| if b.total() > a.total() { b } else { a })
+}

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use rustc_hash::FxHashMap;
 
 use super::super::likelihood::quantile;
-use super::request::SourceCloud;
+use super::source_cloud::SourceCloud;
 
 /// Maximum number of sampled points.
 const POINTS: usize = 200_000;

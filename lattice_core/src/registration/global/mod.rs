@@ -7,10 +7,13 @@
 
 mod alternatives;
 mod axis_hypotheses;
+mod axis_hypothesis;
 mod calibration;
 mod candidates;
 mod cloud_statistics;
 mod covariance;
+mod diagnostics;
+mod error_model;
 mod fit_diagnostics;
 mod map;
 mod margin;
@@ -21,6 +24,7 @@ mod reinterpreted_cloud;
 mod request;
 mod scale;
 mod source;
+mod source_cloud;
 mod track;
 mod verdict;
 mod weak_directions;
@@ -178,12 +182,6 @@ impl Calibration {
         let estimate = self.scale.map_or(1.0, |estimate| estimate.scale);
         (estimate / scale).ln().abs() < SAME_SCALE_LOG_RATIO
     }
-}
-
-/// Candidate with the largest total log-likelihood; the first of equal ones.
-fn most_likely(all: &[Candidate]) -> Option<&Candidate> {
-    all.iter()
-        .reduce(|a, b| if b.total() > a.total() { b } else { a })
 }
 
 /// Reports progress; fails if the caller cancels the registration.

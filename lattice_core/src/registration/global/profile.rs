@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::cloud_statistics::CloudStatistics;
-use super::request::{CalibrationOptions, SourceCloud};
+use super::source_cloud::SourceCloud;
 
 /// Range above which a cloud is from an outdoor lidar, metres.
 const LIDAR_M: f64 = 15.0;
@@ -49,35 +49,6 @@ impl Profile {
             _ if is_noisy && cloud.points_of_cell >= DENSE => Profile::DepthCamera,
             range_m if is_noisy && range_m > INDOOR_LIDAR_M => Profile::Lidar,
             _ => Profile::Headset,
-        }
-    }
-
-    /// Default options of the profile.
-    pub fn options(self) -> CalibrationOptions {
-        let profile = self;
-        let headset = CalibrationOptions::default();
-        match self {
-            Profile::Headset => headset,
-            Profile::Lidar => CalibrationOptions {
-                profile,
-                noise_m: 0.03,
-                region_m: 4.0,
-                scale_sigma: 0.0,
-                gravity_sigma_rad: f64::INFINITY,
-                start_radius_m: 30.0,
-                // Correct poses of scans 30 m apart have at least 0.28; wrong ones lack the margin.
-                min_inliers: 0.2,
-                max_sigma_m: 0.15,
-                ..headset
-            },
-            Profile::DepthCamera => CalibrationOptions {
-                profile,
-                noise_m: 0.03,
-                region_m: 0.5,
-                scale_sigma: 0.01,
-                gravity_sigma_rad: 0.02,
-                ..headset
-            },
         }
     }
 }

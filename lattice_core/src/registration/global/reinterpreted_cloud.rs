@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3};
 use super::super::likelihood::Fit;
 use super::super::search::{Region, SearchSource, search};
 use super::super::{PrepareOptions, PreparedCloud, SemanticCloud};
-use super::axis_hypotheses::AxisHypothesis;
+use super::axis_hypothesis::AxisHypothesis;
 use super::candidates::RegistrationContext;
 
 /// Search hypotheses of the rough search.

@@ -2,21 +2,13 @@
 
 use std::ops::ControlFlow;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 
 use super::calibration::DirectionKind;
 use super::profile::Profile;
+pub use super::source_cloud::SourceCloud;
 use crate::pose::Axes;
-use crate::registration::{Confusion, SemanticCloud};
-
-/// Point cloud to be registered, with the position of its sensor.
-#[derive(Clone, PartialEq, Debug, Default)]
-pub struct SourceCloud {
-    /// Points in the source frame, metres: forward, left, up, gravity along -z.
-    pub cloud: SemanticCloud,
-    /// Position of the sensor in the source frame, if known.
-    pub sensor_m: Option<Point3<f64>>,
-}
+use crate::registration::Confusion;
 
 /// Input of [`register_global`](super::register_global).
 #[derive(Clone, Copy, Debug)]
@@ -74,6 +66,37 @@ pub struct CalibrationOptions {
     pub max_sigma_m: f64,
     /// Largest accepted standard deviation of the orientation about any axis, radians.
     pub max_sigma_rad: f64,
+}
+
+impl Profile {
+    /// Default options of the profile.
+    pub fn options(self) -> CalibrationOptions {
+        let profile = self;
+        let headset = CalibrationOptions::default();
+        match self {
+            Profile::Headset => headset,
+            Profile::Lidar => CalibrationOptions {
+                profile,
+                noise_m: 0.03,
+                region_m: 4.0,
+                scale_sigma: 0.0,
+                gravity_sigma_rad: f64::INFINITY,
+                start_radius_m: 30.0,
+                // Correct poses of scans 30 m apart have at least 0.28; wrong ones lack the margin.
+                min_inliers: 0.2,
+                max_sigma_m: 0.15,
+                ..headset
+            },
+            Profile::DepthCamera => CalibrationOptions {
+                profile,
+                noise_m: 0.03,
+                region_m: 0.5,
+                scale_sigma: 0.01,
+                gravity_sigma_rad: 0.02,
+                ..headset
+            },
+        }
+    }
 }
 
 impl Default for CalibrationOptions {

@@ -8,8 +8,8 @@ use super::super::likelihood::{Partners, region_of};
 use super::calibration::{Calibration, ScaleEstimate};
 use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::{ErrorModel, KERNEL};
+use super::error_model::error_model;
 use super::request::{CalibrationOptions, CalibrationRequest, SourceCloud};
-use super::verdict::error_model;
 use crate::pose::se3;
 
 /// Maximum number of Gauss-Newton iterations, with new correspondences in each.

@@ -3,10 +3,10 @@
 use nalgebra::Isometry3;
 
 use super::candidates::RegistrationContext;
+use super::error_model::is_constrained;
 use super::map::CalibrationMap;
 use super::request::{CalibrationOptions, CalibrationRequest, SourceCloud};
 use super::source::PreparedSource;
-use super::verdict::is_constrained;
 
 /// Log-likelihood ratio above which a refined pose replaces the known one.
 const REPLACE_LEAD: f64 = 2.0;

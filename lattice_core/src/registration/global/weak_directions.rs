@@ -7,8 +7,8 @@ use super::super::likelihood::Fit;
 use super::calibration::{DirectionKind, WeakDirection};
 use super::candidates::{Candidate, RegistrationContext};
 use super::covariance::PoseCovariance;
+use super::error_model::covariance;
 use super::margin::SOFTNESS;
-use super::verdict::covariance;
 use crate::pose::se3;
 
 /// Standard deviation above which a direction is weak, as a fraction of its limit.

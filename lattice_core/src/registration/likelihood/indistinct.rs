@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 
-use super::{Fit, region_of};
+use super::fit::{Fit, region_of};
 
 /// Ratio of the standard deviation of a normal distribution to its median absolute deviation.
 const DEVIATION_OF_MEDIAN: f64 = 1.4826;

@@ -1,14 +1,15 @@
 //! Likelihood of a pose given a source and a target, which ranks all candidates.
 
+mod fit;
 mod indistinct;
 mod partners;
-
-use nalgebra::Point3;
 
 use super::PreparedCloud;
 use super::confusion::{Confusion, Counts, Lift};
 use partners::CLOSENESS;
 
+pub(super) use fit::region_of;
+pub use fit::{Fit, FitScale};
 pub use indistinct::IndistinctDifference;
 pub(super) use indistinct::quantile;
 pub use partners::Partners;
@@ -21,52 +22,6 @@ const CONTRAST: f64 = 25.0;
 const FOLDS: usize = 5;
 /// Maximum number of independent points per region.
 const INDEPENDENT: f64 = 4.0;
-
-/// Expected standard deviations of residuals.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct FitScale {
-    /// Standard deviation across a surface, metres.
-    pub normal_m: f64,
-    /// Standard deviation along a surface, metres; near the spacing of the map's points.
-    pub tangent_m: f64,
-    /// Side of the regions that limit independent points, metres.
-    pub region_m: f64,
-}
-
-impl FitScale {
-    /// Deviations for a map with point spacing `spacing_m` and clouds with `noise_m` of their own.
-    pub fn new(spacing_m: f64, noise_m: f64) -> FitScale {
-        FitScale {
-            normal_m: (0.25 * spacing_m).hypot(noise_m),
-            tangent_m: spacing_m.hypot(noise_m),
-            region_m: 8.0 * spacing_m,
-        }
-    }
-
-    /// Scales the deviations by `factor`, for coarsely refined poses.
-    pub fn coarser(self, factor: f64) -> FitScale {
-        FitScale {
-            normal_m: self.normal_m * factor,
-            tangent_m: self.tangent_m * factor,
-            ..self
-        }
-    }
-
-    /// Maximum distance of correspondences, metres.
-    pub fn gate_m(&self) -> f64 {
-        3.0 * self.tangent_m.max(self.normal_m)
-    }
-}
-
-/// Likelihood model: a source divided into regions, and a target.
-pub struct Fit<'a> {
-    source: &'a PreparedCloud,
-    target: &'a PreparedCloud,
-    scale: FitScale,
-    /// Weight of each source point: points of a dense region share its weight.
-    weights: Vec<f64>,
-    folds: Vec<u8>,
-}
 
 /// Log-likelihood of a pose relative to that of random points.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -244,11 +199,6 @@ impl<'a> Fit<'a> {
         }
         counts
     }
-}
-
-/// Index of the cubic region of side `side_m` that contains a point.
-pub(super) fn region_of(point: &Point3<f64>, side_m: f64) -> [i64; 3] {
-    [point.x, point.y, point.z].map(|c| (c / side_m).floor() as i64)
 }
 
 /// Lift for each fold, from the prior and the other folds.

@@ -10,20 +10,24 @@
 mod coarse;
 mod correction;
 mod jackknife;
+mod mount_number;
 mod planes;
+mod quick;
 mod refine;
+mod samples;
 #[cfg(test)]
 mod tests;
 mod time_scan;
 
-use nalgebra::{Isometry3, Vector3};
-use thiserror::Error;
+use nalgebra::Vector3;
 
 pub use correction::MountCorrection;
 pub use time_scan::MAX_DELAY_S;
 
-use crate::pose::StampedPose;
+pub use mount_number::{MountNumber, MountOptions};
 use refine::Refined;
+pub use samples::{BasePose, MountError, MountSamples};
+use samples::{MIN_PLANES, MIN_POINTS};
 use time_scan::Offset;
 
 /// Names of the seven numbers of a mount, in the order of [`MountEstimate::numbers`].
@@ -36,151 +40,6 @@ const LARGE_RAD: f64 = 0.02;
 const LARGE_M: f64 = 0.15;
 /// Smallest offset of times that the refinement does not reach from none, seconds.
 const LEAST_OFFSET_S: f64 = 0.03;
-/// Minimum number of points.
-const MIN_POINTS: usize = 2000;
-/// Minimum number of planar cells.
-const MIN_PLANES: usize = 30;
-
-/// Pose of the base at the time of points.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BasePose {
-    /// Time, seconds from any origin.
-    pub stamp_s: f64,
-    /// Pose of the base in the map, metres.
-    pub map_from_base: Isometry3<f64>,
-    /// Velocity of the origin of the base in the map frame, m/s.
-    pub velocity_m_per_s: Vector3<f64>,
-    /// Turning rate in the map frame, rad/s.
-    pub rate_rad_per_s: Vector3<f64>,
-}
-
-/// Time on both sides of a pose within which its motion is measured, nanoseconds.
-const HALF_SPAN_NS: i64 = 10_000_000;
-
-impl BasePose {
-    /// Pose and motion at a time in nanoseconds, from `map_from_base` at any time; `None` where that has no pose within
-    /// 10 ms before or after it.
-    pub fn at(
-        at_ns: i64,
-        map_from_base: impl Fn(i64) -> Option<Isometry3<f64>>,
-    ) -> Option<BasePose> {
-        let here = map_from_base(at_ns)?;
-        let before = map_from_base(at_ns.checked_sub(HALF_SPAN_NS)?)?;
-        let after = map_from_base(at_ns.checked_add(HALF_SPAN_NS)?)?;
-        let span_s = 2e-9 * HALF_SPAN_NS as f64;
-        let turn = after.rotation * before.rotation.inverse();
-        let way = after.translation.vector - before.translation.vector;
-        Some(BasePose {
-            stamp_s: at_ns as f64 * 1e-9,
-            map_from_base: here,
-            velocity_m_per_s: way / span_s,
-            rate_rad_per_s: turn.scaled_axis() / span_s,
-        })
-    }
-}
-
-/// Points of one sensor, each with the pose of the base at its time.
-#[derive(Clone, Debug, Default)]
-pub struct MountSamples {
-    /// Poses of the base.
-    pub poses: Vec<BasePose>,
-    /// Place of the pose in `poses`, and the point in the base frame by the stated mount, metres.
-    pub points: Vec<(u32, Vector3<f64>)>,
-    /// Position of the sensor in the base frame by the stated mount, metres.
-    pub sensor_m: Vector3<f64>,
-    /// Poses of the base by time, in the time of `poses`; without them the time offset is at most that of a driver.
-    pub way: Vec<StampedPose>,
-}
-
-/// Options of [`estimate_mount`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MountOptions {
-    /// Largest standard deviation of an excited rotation, radians.
-    pub max_sigma_rad: f64,
-    /// Largest standard deviation of an excited coordinate of the lever arm, metres.
-    pub max_sigma_m: f64,
-    /// Largest standard deviation of an excited time offset, seconds.
-    pub max_sigma_s: f64,
-    /// True to estimate the time offset; else it is 0.
-    pub with_time: bool,
-    /// Standard deviation of the positions of a segment of the log, metres.
-    pub pose_sigma_m: f64,
-    /// Standard deviation of the attitudes of a segment of the log, radians.
-    pub pose_sigma_rad: f64,
-}
-
-impl Default for MountOptions {
-    fn default() -> MountOptions {
-        MountOptions {
-            max_sigma_rad: 0.3_f64.to_radians(),
-            max_sigma_m: 0.05,
-            max_sigma_s: 0.005,
-            with_time: true,
-            pose_sigma_m: 0.02,
-            pose_sigma_rad: 0.05_f64.to_radians(),
-        }
-    }
-}
-
-/// Cause for which no mount is estimated.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
-pub enum MountError {
-    /// Too few points.
-    #[error("{points} points with poses; at least {MIN_POINTS} are needed")]
-    FewPoints {
-        /// Number of points.
-        points: usize,
-    },
-    /// Too few planar cells.
-    #[error(
-        "{planes} cells with a flat surface; at least {MIN_PLANES} are needed: drive past walls and over ground"
-    )]
-    FewPlanes {
-        /// Number of planar cells.
-        planes: usize,
-    },
-    /// Poses that do not move.
-    #[error(
-        "the poses move by {moved_m:.2} m and turn by {turned_deg:.1} degrees; at least 0.5 m or 5 degrees are needed"
-    )]
-    NoMotion {
-        /// Diagonal of the box of positions, metres.
-        moved_m: f64,
-        /// Largest turn from the first pose, degrees.
-        turned_deg: f64,
-    },
-    /// Times of the points that contradict the poses, where surfaces are too few for an estimate.
-    #[error("the points fit the poses with {offset_s:+.2} s added to their times")]
-    Stamps {
-        /// Time to add to those of the points, seconds.
-        offset_s: f64,
-    },
-    /// An optimum that is not better than the stated mount, or outside of the range of the search.
-    #[error(
-        "no mount within {range_deg:.0} degrees and {range_m} m of the stated one fits: {before} occupied voxels with the stated mount, {after} at the best"
-    )]
-    NoFit {
-        /// Range of the search about each axis, degrees.
-        range_deg: f64,
-        /// Range of the search along each axis, metres.
-        range_m: f64,
-        /// Occupied voxels with the stated mount.
-        before: usize,
-        /// Occupied voxels with the estimate.
-        after: usize,
-    },
-}
-
-/// One number of a mount: rad, m or s.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MountNumber {
-    /// Correction to the stated value; 0 unless the motion excited it.
-    pub value: f64,
-    /// Standard deviation of the correction, limited by the range of the search.
-    pub sigma: f64,
-    /// True if the motion excited the number, so that the log determines it.
-    pub is_observable: bool,
-}
 
 /// Fit of points by a mount.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -229,10 +88,46 @@ pub fn estimate_mount(
     options: &MountOptions,
 ) -> Result<MountEstimate, MountError> {
     check_motion(&samples.poses)?;
-    let offset = match options.with_time {
+    estimate_about(offset_of(samples, options), samples, options)
+}
+
+/// Checks the stated mount: `None` if no observable correction near it is certain and above `least` (rad, m, s), else
+/// the estimate. Costs a fraction of [`estimate_mount`] where the mount fits.
+///
+/// # Errors
+/// As [`estimate_mount`].
+pub fn check_mount(
+    samples: &MountSamples,
+    options: &MountOptions,
+    least: [f64; 3],
+) -> Result<Option<MountEstimate>, MountError> {
+    check_motion(&samples.poses)?;
+    let offset = offset_of(samples, options);
+    let is_near = match offset {
+        Offset::Nothing => true,
+        Offset::Near(offset_s) => offset_s.abs() < LEAST_OFFSET_S,
+        Offset::Far(_) => false,
+    };
+    // Too few flat cells may be the fault of the stated mount.
+    if is_near && quick::fits_as_stated(&centered(samples), options, least).unwrap_or(false) {
+        return Ok(None);
+    }
+    estimate_about(offset, samples, options).map(Some)
+}
+
+fn offset_of(samples: &MountSamples, options: &MountOptions) -> Offset {
+    match options.with_time {
         true => time_scan::search(samples),
         false => Offset::Nothing,
-    };
+    }
+}
+
+/// Estimate where the times of points have an offset.
+fn estimate_about(
+    offset: Offset,
+    samples: &MountSamples,
+    options: &MountOptions,
+) -> Result<MountEstimate, MountError> {
     match offset {
         Offset::Nothing => estimate_from(samples, samples, options),
         Offset::Far(offset_s) => {
@@ -315,8 +210,9 @@ fn estimate_from(
     let is_large = correction.rotation.angle() > LARGE_RAD || correction.shift_m.norm() > LARGE_M;
     let limit = if is_large { 0.995 } else { 1.02 };
     // One that is certain makes surfaces thinner where it is right.
-    let is_certain =
-        |number: &MountNumber| number.is_observable && number.value.abs() > 3.0 * number.sigma;
+    let is_certain = |number: &MountNumber| {
+        number.is_observable && number.value.abs() > quick::CERTAIN * number.sigma
+    };
     let is_thicker = after.thickness_m > before.thickness_m && numbers.iter().any(is_certain);
     if outside || is_thicker || after.voxels as f64 > limit * before.voxels as f64 {
         return Err(MountError::NoFit {

@@ -8,7 +8,7 @@ use super::{MIN_PLANES, MountCorrection, MountError, MountNumber, MountOptions, 
 use nalgebra::{Matrix6, UnitQuaternion};
 
 /// Cell sizes, metres, and the most steps at each.
-const LEVELS: [(f64, usize); 3] = [(1.0, 8), (0.5, 10), (0.35, 12)];
+pub(super) const LEVELS: [(f64, usize); 3] = [(1.0, 8), (0.5, 10), (0.35, 12)];
 /// Steps without a segment of the log, from the estimate with it.
 const JACKKNIFE_STEPS: usize = 2;
 /// Largest step of a rotation (rad), of the lever arm (m) and of the time (s).
@@ -63,11 +63,7 @@ pub(super) fn refine(
     for ((sigma, by_time), prior) in all.iter_mut().zip(by_time).zip(PRIOR_SIGMAS) {
         *sigma = sigma.max(by_time).min(prior);
     }
-    let limits = [
-        options.max_sigma_rad,
-        options.max_sigma_m,
-        options.max_sigma_s,
-    ];
+    let limits = options.max_sigmas();
     let mut is_observable = is_free;
     for (i, sigma) in all.iter().enumerate() {
         is_observable[i] &= *sigma <= limits[kind(i)];
@@ -99,7 +95,7 @@ pub(super) fn refine(
 }
 
 /// Kind of a number: rotation, lever arm or time.
-fn kind(number: usize) -> usize {
+pub(super) fn kind(number: usize) -> usize {
     number / 3
 }
 
@@ -157,7 +153,7 @@ fn prior() -> Matrix7 {
 
 /// Standard deviations that allow for correlated errors of points within blocks (White's estimator), and of the poses
 /// within segments of time.
-fn sigmas(
+pub(super) fn sigmas(
     samples: &MountSamples,
     at: &MountCorrection,
     cell_m: f64,
@@ -184,7 +180,8 @@ const PRIOR_SIGMAS: [f64; 7] = [
     PRIOR[0], PRIOR[0], PRIOR[0], PRIOR[1], PRIOR[1], PRIOR[1], PRIOR[2],
 ];
 
-fn iterate(
+/// Steps of Gauss-Newton until they are small, at one cell size.
+pub(super) fn iterate(
     samples: &MountSamples,
     correction: &mut MountCorrection,
     cell_m: f64,

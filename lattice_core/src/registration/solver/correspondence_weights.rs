@@ -3,18 +3,10 @@
 use nalgebra::{Point3, Vector3};
 
 use super::correspondences::{Correspondences, Layer, NONE, Placed, Slot};
-use crate::registration::{
-    LabelDistribution, LabelUse, Method, PreparedCloud, RegisterOptions, SemanticVariant,
-};
+use crate::registration::{LabelDistribution, LabelUse, SemanticVariant};
 
 /// Squared Mahalanobis distance at which inlier and outlier are equally likely.
 const OUTLIER_SQUARED: f64 = 9.0;
-
-/// Labels of both clouds, in the order of the trees.
-pub(super) struct Labels<'a> {
-    pub source: &'a [LabelDistribution],
-    pub target: &'a [LabelDistribution],
-}
 
 impl Correspondences<'_> {
     /// Weights the candidates of a source point; those of weight zero are removed.
@@ -100,25 +92,4 @@ fn overlap(source: &LabelDistribution, target: &LabelDistribution) -> f64 {
 
 fn label_at(labels: &[LabelDistribution], i: usize) -> LabelDistribution {
     labels.get(i).copied().unwrap_or(LabelDistribution::UNKNOWN)
-}
-
-/// Labels that a method uses.
-pub(super) fn labels<'a>(
-    source: &'a PreparedCloud,
-    target: &'a PreparedCloud,
-    options: &RegisterOptions,
-) -> Labels<'a> {
-    let blurred = options.method == Method::Semantic(SemanticVariant::Published)
-        && options.labels == LabelUse::Soft;
-    if blurred {
-        Labels {
-            source: source.blurred_labels(),
-            target: target.blurred_labels(),
-        }
-    } else {
-        Labels {
-            source: source.labels(),
-            target: target.labels(),
-        }
-    }
 }

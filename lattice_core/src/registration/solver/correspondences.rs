@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
 use super::correspondence::{Correspondence, Metric};
-use super::correspondence_weights::{Labels, labels};
+use super::method_labels::{Labels, labels};
 use super::normal_equations::NormalEquations;
 use super::robust_kernel::Kernel;
 use crate::kd_tree::{Nearest, Neighbors};

@@ -7,6 +7,7 @@
 mod correspondence;
 mod correspondence_weights;
 mod correspondences;
+mod method_labels;
 mod normal_equations;
 mod robust_kernel;
 

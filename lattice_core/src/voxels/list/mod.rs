@@ -5,7 +5,9 @@ mod checksum;
 mod exposed_faces;
 mod fill;
 mod insert;
+mod insert_report;
 mod remove;
+mod state;
 mod when_full;
 
 use std::fmt;
@@ -24,9 +26,10 @@ use crate::cloud::Cloud;
 use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
 
 pub use changes::Changes;
-pub use insert::{InsertReport, PointColumns};
+pub use insert::PointColumns;
+pub use insert_report::InsertReport;
 pub use remove::NoStamps;
-pub use when_full::WhenFull;
+pub use state::{VoxelList, WhenFull};
 
 /// Datum that is not finite or out of range.
 #[derive(Clone, Copy, PartialEq, Debug, Error)]
@@ -36,42 +39,6 @@ pub struct DatumError {
     pub x: f64,
     pub y: f64,
     pub z: f64,
-}
-
-/// Occupied voxel list of a lattice whose indices count from a datum in the map frame.
-///
-/// The datum is a lattice point of the map frame. Lists with one lattice and datum have the same cells, and points
-/// far from the map origin keep their precision.
-///
-/// ```
-/// use lattice_core::cloud::Cloud;
-/// use lattice_core::lattice::{Lattice, LatticeKind};
-/// use lattice_core::nalgebra::Vector3;
-/// use lattice_core::voxels::VoxelList;
-///
-/// let lattice = Lattice::new(LatticeKind::Cubic, 1.0)?;
-/// let mut list = VoxelList::new(lattice, Vector3::zeros(), 1000)?;
-/// let points_m = [0.1, 0.2, 2.0].map(|x| Vector3::new(x, 0.0, 0.0));
-/// let report = list.insert(&Cloud::from_points(0, Vector3::zeros(), &points_m));
-/// assert_eq!((report.inserted, report.new_voxels), (3, 2));
-/// let counts: Vec<_> = list.sorted().iter().map(|(_, voxel)| voxel.count).collect();
-/// assert_eq!(counts, [2, 1]);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone)]
-pub struct VoxelList {
-    pub(super) lattice: Lattice,
-    pub(super) datum_index: [i64; 3],
-    pub(super) datum_m: Vector3<f64>,
-    pub(super) max_voxels: usize,
-    pub(super) when_full: WhenFull,
-    pub(super) payload: Payload,
-    pub(super) shards: Vec<Shard>,
-    pub(super) sums: DistortionSums,
-    /// State counter.
-    pub(super) sequence: u32,
-    /// State at the last `take_changes`.
-    pub(super) taken: u32,
 }
 
 impl VoxelList {

@@ -1,22 +1,8 @@
 //! Full lists: refuse new voxels or evict the oldest.
 
-use super::VoxelList;
+use super::state::{VoxelList, WhenFull};
 use crate::lattice::BlockKey;
 use crate::voxels::store::shard::Shard;
-
-/// Policy of a full list for points in new cells.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum WhenFull {
-    /// Refuses them; points in existing cells still count.
-    #[default]
-    Refuse,
-    /// Evicts the least recently changed voxels until 7/8 of the limit are left.
-    ///
-    /// Points are inserted in portions of at most 1/8 of the limit. Before a portion that may not fit, voxels are
-    /// evicted in the order of the state of their last change, then of their cells: the same on any number of
-    /// threads. No point is refused, except by a list of at most 0 voxels.
-    ForgetOldest,
-}
 
 impl VoxelList {
     /// Sets the policy of [`VoxelList::insert`].

@@ -19,32 +19,11 @@ const BLOCK_BYTES: usize = Table::<Block>::ROW_BYTES;
 /// Maximum memory besides blocks.
 const FIRST_BYTES: usize = Table::<Block>::FIRST_BYTES + Recent::BYTES;
 
-#[derive(Clone)]
-pub(super) struct Block {
-    pub(super) code: u64,
-    pub(super) leaf: BlockMask,
-}
-
 impl Row for Block {
     #[inline(always)]
     fn code(&self) -> u64 {
         self.code
     }
-}
-
-/// Occupied voxels without payload: blocks of 8 x 8 x 8 indices with one bit per cell.
-///
-/// The fastest and smallest store, 2 to 4 bytes per voxel on surfaces. When `max_bytes` is reached, points in new
-/// blocks are refused and counted; existing blocks still accept points.
-#[derive(Clone)]
-pub struct OccupancyList {
-    lattice: Lattice,
-    datum_index: [i64; 3],
-    datum_m: Vector3<f64>,
-    max_blocks: usize,
-    pub(super) blocks: Table<Block>,
-    len: usize,
-    recent: Recent,
 }
 
 impl OccupancyList {
@@ -199,22 +178,6 @@ impl OccupancyList {
     }
 }
 
-/// Block of the last lookup.
-#[derive(Clone, Copy)]
-struct Last {
-    block: u64,
-    number: u32,
-}
-
-impl Default for Last {
-    fn default() -> Last {
-        Last {
-            block: u64::MAX,
-            number: 0,
-        }
-    }
-}
-
 impl VoxelStore for OccupancyList {
     fn lattice(&self) -> &Lattice {
         &self.lattice
@@ -297,8 +260,13 @@ impl fmt::Debug for OccupancyList {
 }
 
 mod insert;
+mod last_block;
 mod neighbors;
 mod overlap;
 mod recent_cells;
+mod state;
+use last_block::Last;
+pub(super) use state::Block;
+pub use state::OccupancyList;
 #[cfg(test)]
 mod tests;

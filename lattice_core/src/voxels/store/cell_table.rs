@@ -1,9 +1,9 @@
 //! Table of voxels, looked up by block.
 
 use super::block_mask::{self, BlockMask};
+use super::entry::Entry;
 use super::growth;
 use super::hash_table::{Place, Row, Table};
-use super::shard::Entry;
 use crate::lattice::BlockKey;
 use crate::prefetch::prefetch;
 

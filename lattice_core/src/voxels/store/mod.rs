@@ -12,6 +12,7 @@
 
 pub(crate) mod block_mask;
 mod cell_table;
+mod entry;
 pub(super) mod fixed_point;
 pub(super) mod growth;
 pub(crate) mod hash_table;

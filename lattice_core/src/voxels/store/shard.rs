@@ -3,6 +3,7 @@
 use rustc_hash::FxHashMap;
 
 use super::cell_table::CellTable;
+pub(crate) use super::entry::{Entry, Life};
 use super::fixed_point::{Offsets, Point, most_points, offsets_of, points_of, voxel_of};
 use super::hash_table::Place;
 use super::payload_columns::Columns;
@@ -17,31 +18,6 @@ pub(crate) const SHARDS: usize = 16;
 /// Number of cells searched together.
 pub(crate) const BATCH: usize = 128;
 
-/// States of the list in which a voxel was added and last changed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Life {
-    pub(crate) born: u32,
-    pub(crate) touched: u32,
-}
-
-impl Life {
-    fn ended(self, now: u32) -> Life {
-        Life {
-            born: self.born,
-            touched: now,
-        }
-    }
-}
-
-/// Row of a voxel.
-#[derive(Clone)]
-pub(crate) struct Entry {
-    pub(crate) code: u64,
-    /// Sums of up to [`most_points`]; for more, the index of their [`WideSums`] and the count.
-    points: Point,
-    pub(crate) life: Life,
-}
-
 /// Voxels of some blocks, in insertion order.
 #[derive(Clone)]
 pub(crate) struct Shard {
@@ -52,19 +28,6 @@ pub(crate) struct Shard {
     wide: WideSums,
     /// Removed voxels: states in which they were added and removed.
     pub(crate) removed: FxHashMap<u64, Life>,
-}
-
-impl Entry {
-    /// Number of points; saturates at `u32::MAX`.
-    #[inline(always)]
-    pub(crate) fn count(&self) -> u32 {
-        self.points.as_array()[3]
-    }
-
-    /// Index of the sums of a voxel with many points.
-    fn wide(&self) -> u32 {
-        self.points.as_array()[0]
-    }
 }
 
 /// Shard index of a cell; all cells of a block belong to one.

@@ -2,7 +2,7 @@
 
 use lattice_bag::BagReader;
 use lattice_core::registration::mounts::{
-    MAX_DELAY_S, MountError, MountEstimate, MountNumber, MountOptions, estimate_mount,
+    MAX_DELAY_S, MountError, MountEstimate, MountNumber, MountOptions, check_mount,
 };
 use lattice_nodes::replay::{self, Slice, TopicPlan};
 
@@ -119,8 +119,10 @@ impl Replay {
         let log_name = self.bag.display();
         let remedy =
             |topic: &str| format!("`lattice calibrate mounts {log_name} --points {topic}`");
-        let better = match estimate_mount(&log.samples, &options) {
-            Ok(estimate) => Better::of(&estimate),
+        let [degrees, least_m, least_s] = WRONG;
+        let least = [degrees.to_radians(), least_m, least_s];
+        let better = match check_mount(&log.samples, &options, least) {
+            Ok(estimate) => estimate.as_ref().and_then(Better::of),
             Err(MountError::Stamps { offset_s }) => Some(Better::of_offset(offset_s)),
             // Too little to judge by: no alarm.
             Err(_) => None,
@@ -153,8 +155,8 @@ impl Replay {
         };
         let sensors = log.mounts.iter().enumerate().take(MAX_SENSORS);
         let found = sensors.filter_map(|(sensor, mount)| {
-            let estimate = estimate_mount(&log.of_sensor(sensor), &alone).ok()?;
-            let Better { text, .. } = Better::of(&estimate)?;
+            let checked = check_mount(&log.of_sensor(sensor), &alone, least).ok()?;
+            let Better { text, .. } = Better::of(&checked?)?;
             let topic = &mount.topic;
             Some(format!("clouds of {topic} fit {text}: {}", remedy(topic)))
         });

@@ -1,7 +1,7 @@
 //! The page at the sizes of a desktop and a phone, dark and light: nothing lies over anything else, nothing is cut off.
 
-use lattice_msgs::calibration::{CalibrationResult, WeakDirection};
 use lattice_msgs::geometry_msgs::Vector3;
+use lattice_msgs::lattice::{CalibrationResult, WeakDirection};
 use serde_json::json;
 
 use crate::browser::chromium;

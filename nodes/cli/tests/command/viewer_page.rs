@@ -1,7 +1,7 @@
 //! The page's layers and controls on a map of few cells that are known: colours, slice, verdicts, phone.
 
-use lattice_msgs::calibration::{CalibrationResult, WeakDirection};
 use lattice_msgs::geometry_msgs::Vector3;
+use lattice_msgs::lattice::{CalibrationResult, WeakDirection};
 use serde_json::json;
 
 use crate::browser::chromium;

@@ -111,7 +111,7 @@ mod tests {
     use log::{Level, Log, Metadata};
 
     use super::*;
-    use crate::ros_args::RosArgs;
+    use crate::config::ros_args::RosArgs;
 
     #[test]
     fn levels_change_and_are_bounded() {

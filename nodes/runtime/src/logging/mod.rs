@@ -4,12 +4,13 @@ mod file;
 mod layout;
 mod levels;
 mod plan;
+mod record;
 mod throttle;
 
 pub(crate) use levels::{level, set_level};
 pub use throttle::Throttle;
 
-use crate::ros_args::RosArgs;
+use crate::config::ros_args::RosArgs;
 use crate::sync::lock;
 use env_logger::Logger;
 use file::LogFile;
@@ -17,10 +18,10 @@ use layout::Layout;
 use levels::{Console, Shown};
 use log::{Log, Metadata, Record, SetLoggerError};
 use plan::Plan;
+use record::{now_ns, source};
 use std::{
     cell::Cell,
     sync::{Arc, Mutex, OnceLock},
-    time::{SystemTime, UNIX_EPOCH},
 };
 
 /// Receives every record that passes the log level, with the name of its node.
@@ -116,21 +117,6 @@ impl Log for Tee {
 impl Tee {
     fn console(&self) -> Arc<Logger> {
         Arc::clone(&lock(&self.console))
-    }
-}
-
-fn now_ns() -> u128 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.unwrap_or_default().as_nanos()
-}
-
-/// Node of a record: the process's node, unless the target is not a module path.
-fn source<'a>(target: &'a str, node_name: &'a str) -> &'a str {
-    const LIBRARIES: [&str; 3] = ["lattice_core", "lattice_msgs", "lattice_nodes"];
-    if target.contains("::") || LIBRARIES.contains(&target) {
-        node_name
-    } else {
-        target
     }
 }
 

@@ -1,4 +1,4 @@
-use crate::ros_args::RosArgs;
+use crate::config::ros_args::RosArgs;
 use std::collections::BTreeMap;
 
 use env_logger::{Builder, Target, WriteStyle};

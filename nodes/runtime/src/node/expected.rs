@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
-use super::Node;
-use crate::diagnostics::{Diagnostics, Level};
-use crate::names::{self, shown};
-use crate::remote::RemotePublisher;
-use crate::shared::Shared;
-use crate::subscription::{Intake, Subscription};
+use super::diagnostics::{Diagnostics, Level};
+use super::shared::Shared;
+use super::timer::Timer;
+use crate::communication::subscription::{Intake, Subscription};
+use crate::config::names::{self, shown};
 use crate::sync::lock;
-use crate::timer::Timer;
+use crate::task_thread::TaskThread;
+use crate::transport::remote::RemotePublisher;
 
 /// Time allowed for a publisher to appear, wall clock.
 const PATIENCE: Duration = Duration::from_secs(3);
@@ -48,61 +48,46 @@ enum Named {
 
 /// Origin of a topic's messages.
 #[derive(Clone, Copy)]
-struct Source {
-    from: &'static str,
-    parameter: Option<&'static str>,
-    is_like: fn(&str) -> bool,
+pub(super) struct Source {
+    pub from: &'static str,
+    pub parameter: Option<&'static str>,
+    pub is_like: fn(&str) -> bool,
 }
 
-impl Node {
-    /// Reports each of these topics that has no publisher 3 s from now: once in the log, again when alternative
-    /// topics appear, and in the task `inputs` of `/diagnostics` while it has none.
-    ///
-    /// The message names alternative topics of the same type for which `is_like` holds. `from` names the
-    /// publisher of the topic, `parameter` the parameter that sets it.
-    pub fn expect_publishers<'a>(
+impl Expected {
+    /// Adds subscriptions; true if the first [`Watch`] is to be started.
+    pub(super) fn add<'a>(
         &self,
         subscriptions: impl IntoIterator<Item = &'a Subscription>,
-        from: &'static str,
-        parameter: Option<&'static str>,
-        is_like: fn(&str) -> bool,
-    ) {
+        source: Source,
+    ) -> bool {
         let now = Instant::now();
-        let source = Source {
-            from,
-            parameter,
-            is_like,
-        };
         let input = |of: &Subscription| Input {
             intake: Arc::downgrade(&of.intake),
             due: now.checked_add(PATIENCE).unwrap_or(now),
             named: Named::No,
             source,
         };
-        let mut state = lock(&self.inner.expected.0);
+        let mut state = lock(&self.0);
         state.inputs.extend(subscriptions.into_iter().map(input));
-        if !std::mem::replace(&mut state.is_watched, true) {
-            let watch = Watch {
-                expected: Arc::clone(&self.inner.expected),
-                shared: Arc::downgrade(&self.inner.shared),
-                diagnostics: self.diagnostics(),
-                namespace: self.inner.namespace.clone(),
-            };
-            let io = &self.inner.shared.io;
-            Timer::start(io, PERIOD, move || watch.look(Instant::now())).detach();
-        }
+        !std::mem::replace(&mut state.is_watched, true)
     }
 }
 
 /// Periodic check of the publishers.
-struct Watch {
-    expected: Arc<Expected>,
-    shared: Weak<Shared>,
-    diagnostics: Diagnostics,
-    namespace: String,
+pub(super) struct Watch {
+    pub expected: Arc<Expected>,
+    pub shared: Weak<Shared>,
+    pub diagnostics: Diagnostics,
+    pub namespace: String,
 }
 
 impl Watch {
+    /// Checks periodically on the io thread.
+    pub(super) fn start(self, io: &TaskThread) {
+        Timer::start(io, PERIOD, move || self.look(Instant::now())).detach();
+    }
+
     fn look(&self, now: Instant) {
         let Some(shared) = self.shared.upgrade() else {
             return;
@@ -212,7 +197,7 @@ fn line(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::qos::Qos;
+    use crate::transport::qos::Qos;
 
     const CLOUD: &str = "sensor_msgs/msg/PointCloud2";
     const SOURCE: Source = Source {

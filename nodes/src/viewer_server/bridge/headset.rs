@@ -1,7 +1,7 @@
 //! Headset topics that clients may publish on: a fixed table.
 
 use lattice_msgs::geometry_msgs::PoseStamped;
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 use lattice_msgs::sensor_msgs::{CameraInfo, CompressedImage, Image, PointCloud2};
 use lattice_msgs::vision_msgs::LabelInfo;
 use lattice_msgs::visualization_msgs::Marker;

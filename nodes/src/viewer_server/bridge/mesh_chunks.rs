@@ -1,6 +1,6 @@
 //! Chunking of mesh surfaces that a client sends as a whole.
 
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 
 use crate::convert::headset_mesh::{self, chunks_for};
 use crate::viewer_server::inputs::InputRefusal;

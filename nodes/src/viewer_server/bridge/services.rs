@@ -2,8 +2,7 @@
 
 use std::time::Duration;
 
-use lattice_msgs::calibration::Calibrate;
-use lattice_msgs::lattice::{ClearBox, PlanPath, QueryMap, SaveMap};
+use lattice_msgs::lattice::{Calibrate, ClearBox, PlanPath, QueryMap, SaveMap};
 use lattice_msgs::rosbag2_interfaces::{
     GetRate, IsPaused, Pause, PlayNext, Resume, Seek, SetRate, TogglePaused,
 };

@@ -4,9 +4,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use futures::StreamExt;
-use lattice_msgs::calibration::{
-    CalibrateAction, CalibrateFeedback, CalibrateGoal, CalibrateResult,
-};
+use lattice_msgs::lattice::{CalibrateAction, CalibrateFeedback, CalibrateGoal, CalibrateResult};
 use lattice_runtime::ros_args::RosArgs;
 use lattice_runtime::{ActionLimits, GoalHandle, Runtime};
 use ros2_client::action::{ActionClientQosPolicies, GoalId};

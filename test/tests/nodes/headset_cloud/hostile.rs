@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 use lattice_msgs::sensor_msgs::CameraInfo;
 use proptest::prelude::*;
 

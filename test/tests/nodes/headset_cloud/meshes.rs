@@ -6,7 +6,7 @@ use lattice_core::pose::Axes;
 use lattice_lab::mesh::{read_mesh, read_mesh_in};
 use lattice_lab::simulate::house::HouseScan;
 use lattice_msgs::geometry_msgs::{Point, Vector3};
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 use lattice_msgs::visualization_msgs::Marker;
 use lattice_nodes::convert::geometry::header;
 use lattice_nodes::headset_cloud::{HeadsetCloud, HeadsetOutput, HeadsetStream};

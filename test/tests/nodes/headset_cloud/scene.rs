@@ -6,7 +6,7 @@ use lattice_core::pose::Axes;
 use lattice_lab::mesh::LabelledMesh;
 use lattice_lab::simulate::house::HouseScan;
 use lattice_msgs::geometry_msgs::{Point, Pose, PoseStamped, Quaternion};
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 use lattice_msgs::sensor_msgs::{CameraInfo, Image};
 use lattice_nodes::convert::geometry::header;
 use lattice_nodes::convert::headset_mesh::in_chunks;

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use lattice_core::pose::Axes;
 use lattice_core::registration::UNLABELED;
 use lattice_msgs::cdr;
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 use lattice_msgs::sensor_msgs::{CameraInfo, Image};
 use lattice_nodes::convert::geometry::header;
 use lattice_nodes::headset_cloud::{HeadsetCloud, HeadsetStream};

@@ -7,8 +7,8 @@ use lattice_core::lattice::LatticeKind;
 use lattice_core::registration::{
     Calibration, CalibrationOptions, Progress, SourceCloud, Stage, TrackUpdate, Verdict,
 };
-use lattice_msgs::calibration::{CalibrateGoal, CalibrateResult, CalibrationResult};
 use lattice_msgs::geometry_msgs::TransformStamped;
+use lattice_msgs::lattice::{CalibrateGoal, CalibrateResult, CalibrationResult};
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::std_msgs::String as StringMessage;
 use lattice_nodes::convert::semantic::LabelOptions;

@@ -1,7 +1,7 @@
 //! Looks that are refused, that do not fit, and that fit somewhat.
 
 use lattice_core::registration::Verdict;
-use lattice_msgs::calibration::CalibrateGoal;
+use lattice_msgs::lattice::CalibrateGoal;
 use lattice_nodes::semantic_icp_server::{ServerOptions, Work};
 use lattice_test::clouds::{SECOND_NS, cloud, labelled_cloud};
 

@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use lattice_core::registration::Verdict;
-use lattice_msgs::calibration::{CalibrateGoal, CalibrationResult};
+use lattice_msgs::lattice::{CalibrateGoal, CalibrationResult};
 use lattice_nodes::convert::geometry::pose_from;
 use lattice_nodes::semantic_icp_server::{End, SearchWhen, ServerOptions, WhenBusy, Work};
 use nalgebra::Isometry3;

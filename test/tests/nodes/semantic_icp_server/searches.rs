@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use lattice_core::pose::Axes;
 use lattice_core::registration::Verdict;
-use lattice_msgs::calibration::CalibrateGoal;
+use lattice_msgs::lattice::CalibrateGoal;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 use lattice_nodes::convert::geometry::isometry_from_transform;
 use lattice_nodes::semantic_icp_server::{End, LatticeSearch, SearchWhen, ServerOptions};

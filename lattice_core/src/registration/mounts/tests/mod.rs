@@ -2,6 +2,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::*;
 
+mod check;
 mod stamps;
 
 /// Pseudorandom numbers from -1 to 1.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use lattice_lab::datasets::{Indoor, IndoorOptions, label_accuracy, write_indoor};
-use lattice_msgs::calibration::CalibrationResult;
+use lattice_msgs::lattice::CalibrationResult;
 use lattice_nodes::convert::calibration::verdict_name;
 use lattice_nodes::convert::geometry::isometry_from_transform;
 use lattice_nodes::files::atomic_write::write_text;

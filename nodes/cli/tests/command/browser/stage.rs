@@ -5,13 +5,12 @@ use std::sync::Arc;
 
 use lattice_core::lattice::MortonKey;
 use lattice_core::voxels::codec;
-use lattice_msgs::calibration::CalibrationResult;
 use lattice_msgs::cdr;
 use lattice_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use lattice_msgs::geometry_msgs::{
     Point, Pose, PoseStamped, Quaternion, TransformStamped, Vector3,
 };
-use lattice_msgs::lattice::{LatticeInfo, LatticeMap};
+use lattice_msgs::lattice::{CalibrationResult, LatticeInfo, LatticeMap};
 use lattice_msgs::nav_msgs::Path;
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::tf2_msgs::TFMessage;

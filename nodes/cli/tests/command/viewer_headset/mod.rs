@@ -9,8 +9,8 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use async_tungstenite::tungstenite::Message;
-use lattice_msgs::calibration::{CalibrateRequest, CalibrateResponse, CalibrationResult};
 use lattice_msgs::cdr;
+use lattice_msgs::lattice::{CalibrateRequest, CalibrateResponse, CalibrationResult};
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_runtime::LoopbackDomain;
 use serde_json::{Value, json};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use lattice_bag::{BagQos, BagWriter};
 use lattice_core::voxels::VoxelList;
 use lattice_msgs::geometry_msgs::PoseStamped;
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 use lattice_msgs::sensor_msgs::{CameraInfo, Image};
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::LabelInfo;

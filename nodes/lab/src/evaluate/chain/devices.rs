@@ -7,7 +7,7 @@ use lattice_core::lattice::Lattice;
 use lattice_core::registration::{LabelDistribution, SemanticCloud, SourceCloud, UNLABELED};
 use lattice_core::voxels::{Payload, VoxelList};
 use lattice_msgs::geometry_msgs::PoseStamped;
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 use lattice_msgs::sensor_msgs::{Image, PointCloud2};
 use lattice_nodes::convert::geometry::{header, pose_from};
 use lattice_nodes::convert::headset_mesh::{chunks_for, in_chunks};

@@ -1,6 +1,6 @@
 //! Messages of a house as the cameras and the headset in it send them.
 
-use lattice_msgs::headset::HeadsetMesh;
+use lattice_msgs::lattice::HeadsetMesh;
 use lattice_msgs::sensor_msgs::Image;
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
