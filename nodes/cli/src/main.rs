@@ -6,6 +6,7 @@ mod tool_log;
 #[macro_use]
 mod streams;
 
+mod about;
 #[cfg(feature = "bags")]
 mod bag;
 #[cfg(feature = "bags")]
@@ -21,6 +22,8 @@ mod lab;
 mod link;
 mod map;
 mod node;
+#[cfg(feature = "pages")]
+mod pages;
 mod points;
 mod progress;
 mod quantize;
@@ -82,6 +85,12 @@ enum Command {
     Map(map::Map),
     /// Merge logs and robots into one map as tables on a data engine; needs the program lattice-fleet
     Fleet(fleet::Fleet),
+    /// Print version, licences and features of this program
+    About(about::About),
+    /// Write man pages and shell completions
+    #[cfg(feature = "pages")]
+    #[command(hide = true)]
+    Pages(pages::Pages),
     #[cfg(feature = "lab")]
     #[command(flatten)]
     Lab(lab::Lab),
@@ -129,6 +138,9 @@ impl Command {
             Command::Calibrate(command) => command.run(),
             Command::Map(command) => command.run(),
             Command::Fleet(command) => command.run(),
+            Command::About(command) => command.run(),
+            #[cfg(feature = "pages")]
+            Command::Pages(command) => command.run(),
             #[cfg(feature = "lab")]
             Command::Lab(command) => command.run(),
         }

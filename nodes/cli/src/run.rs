@@ -1,5 +1,11 @@
 //! `lattice run`: several nodes in one process.
 
+use std::env;
+use std::ffi::OsStr;
+use std::io;
+use std::os::linux::net::SocketAddrExt;
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::net::{SocketAddr, UnixDatagram};
 use std::path::PathBuf;
 
 use clap::Args;
@@ -92,8 +98,22 @@ impl Run {
         for (name, start) in nodes {
             running.start(&runtime, name, *start, executables::reader_of(name))?;
         }
+        if let Some(manager) = env::var_os("NOTIFY_SOCKET") {
+            ready(&manager).map_err(|e| format!("NOTIFY_SOCKET={}: {e}", manager.display()))?;
+        }
         running.until_stopped(&runtime)
     }
+}
+
+/// Reports to the service manager that the nodes have started (sd_notify). A name with `@` is an abstract one.
+fn ready(manager: &OsStr) -> io::Result<()> {
+    let address = match manager.as_bytes() {
+        [b'@', name @ ..] => SocketAddr::from_abstract_name(name)?,
+        _ => SocketAddr::from_pathname(manager)?,
+    };
+    UnixDatagram::unbound()?
+        .send_to_addr(b"READY=1", &address)
+        .map(drop)
 }
 
 /// Names of the nodes that can share a process.

@@ -14,6 +14,7 @@ mod evaluate;
 mod files;
 mod health;
 mod indoor;
+mod install;
 mod lifecycle;
 mod map;
 mod map_save;

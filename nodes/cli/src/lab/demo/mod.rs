@@ -58,7 +58,7 @@ pub struct Demo {
     #[cfg(feature = "headset")]
     #[arg(long, requires = "indoor", default_value_t = 240)]
     views: usize,
-    /// Directory for the log and the maps [default: target/lattice_demo, indoors target/lattice_demo_indoor]
+    /// Directory for the log and the maps [default: lattice_demo, indoors lattice_demo_indoor]
     #[arg(long)]
     out: Option<PathBuf>,
     /// Seed of the simulation
@@ -94,7 +94,7 @@ impl Demo {
         if self.indoor {
             return self.run_indoor();
         }
-        let (out, _lock) = self.out("target/lattice_demo")?;
+        let (out, _lock) = self.out("lattice_demo")?;
         let bag = out.join("log");
         let params = out.join("bobcat.yaml");
         write_text(&params, BOBCAT_PARAMS)?;
@@ -191,7 +191,7 @@ impl Demo {
 
     #[cfg(feature = "headset")]
     fn run_indoor(&self) -> CliResult {
-        let (out, _lock) = self.out("target/lattice_demo_indoor")?;
+        let (out, _lock) = self.out("lattice_demo_indoor")?;
         let model = match self.true_labels {
             true => None,
             false => Some(network::model(self.model.as_ref(), &out)?),

@@ -136,6 +136,11 @@ pub const RULES: &[(&str, &str, Rule)] = &[
         "lattice bench camera",
         NotHere("measures for a minute"),
     ),
+    (
+        "docs/install.md",
+        "",
+        NotHere("needs PyPI or systemd; .ci/install installs the packages"),
+    ),
     ("docs/headset.md", "lattice run", Works("lattice_mapper")),
     (
         "docs/nodes.md",
