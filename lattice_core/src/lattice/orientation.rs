@@ -17,7 +17,7 @@ impl Orientation {
     /// gives the same bits.
     ///
     /// Fails for crystal axes that the lattice does not have. For `Custom`, `Ground` is unknown here: use
-    /// [`Lattice::with_orientation`].
+    /// [`Lattice::with_orientation`](super::Lattice::with_orientation).
     pub fn map_from_lattice(self, kind: LatticeKind) -> Result<UnitQuaternion<f64>, LatticeError> {
         let up = match self {
             Self::Paper => None,

@@ -1,6 +1,6 @@
 //! Numbers of a mount, and options of their estimate.
 
-/// Options of [`estimate_mount`].
+/// Options of [`estimate_mount`](super::estimate_mount).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MountOptions {
     /// Largest standard deviation of an excited rotation, radians.
