@@ -1,7 +1,5 @@
 //! The `lattice` command, and every node by its name.
 
-mod lattices;
-mod tool_log;
 // First, for its macros.
 #[macro_use]
 mod streams;
@@ -19,6 +17,7 @@ mod fleet;
 mod health;
 #[cfg(feature = "lab")]
 mod lab;
+mod lattices;
 mod link;
 mod map;
 mod node;
@@ -32,6 +31,7 @@ mod record;
 #[cfg(feature = "bags")]
 mod replay;
 mod run;
+mod tool_log;
 #[cfg(feature = "viewer")]
 mod view;
 

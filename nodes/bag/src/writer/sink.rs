@@ -1,4 +1,4 @@
-//! Storage of a writer, and what it is told.
+//! Storage of a bag writer, with the options and topics that it takes.
 
 use std::{
     error::Error,
