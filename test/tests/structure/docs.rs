@@ -3,6 +3,7 @@
 use std::fs;
 
 use super::root;
+use super::source::{files, files_ending_in};
 
 const PAGES: [&str; 2] = ["docs/dev/architecture.md", "CONTRIBUTING.md"];
 
@@ -62,4 +63,37 @@ fn every_path_and_name_in_the_pages_exists() {
         }
         assert!(paths > 10, "{page} names {paths} paths");
     }
+}
+
+/// Names after `--example` in a text.
+fn examples(text: &str) -> Vec<&str> {
+    let behind = text.split("--example").skip(1);
+    let names = behind.filter_map(|rest| {
+        let rest = rest.trim_start_matches([' ', '"', ',']);
+        let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_');
+        rest.get(..end.unwrap_or(rest.len()))
+    });
+    names.filter(|name| !name.is_empty()).collect()
+}
+
+#[test]
+fn examples_that_pages_and_scripts_run_exist() {
+    let sources = ["lattice_core", "msgs", "nodes"].map(|folder| root().join(folder));
+    let sources: Vec<_> = sources.iter().flat_map(|folder| files(folder)).collect();
+    let mut texts = files_ending_in(&["md"], &root().join("docs"));
+    for folder in ["lattice_core", "msgs", "nodes"] {
+        texts.extend(files_ending_in(&["md"], &root().join(folder)));
+    }
+    texts.extend(["README.md", "test/peers/instructions"].map(|name| root().join(name)));
+    let mut found = 0;
+    for path in texts {
+        let text = fs::read_to_string(&path).unwrap();
+        for name in examples(&text) {
+            let file = format!("examples/{name}.rs");
+            let exists = sources.iter().any(|source| source.ends_with(&file));
+            assert!(exists, "{}: there is no {file}", path.display());
+            found += 1;
+        }
+    }
+    assert!(found > 3, "{found}");
 }
