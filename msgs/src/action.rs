@@ -1,8 +1,8 @@
 //! Actions.
 
-use crate::builtin_interfaces::Time;
-use crate::unique_identifier_msgs::UUID;
-use crate::{RosMessage, RosService};
+use crate::interface::{RosMessage, RosService};
+use crate::packages::builtin_interfaces::Time;
+use crate::packages::unique_identifier_msgs::UUID;
 
 /// An action: a long-running goal with feedback and a result.
 pub trait RosAction: Send + 'static {

@@ -80,6 +80,12 @@ pub trait RosMessage:
     }
 }
 
+/// Visitor of every message type; see [`visit_messages`](crate::visit_messages).
+pub trait MessageVisitor {
+    /// Called once for each type.
+    fn visit<M: RosMessage>(&mut self);
+}
+
 /// A service.
 pub trait RosService {
     /// Type name, such as `std_srvs/srv/Trigger`.

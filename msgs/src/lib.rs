@@ -27,16 +27,6 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-pub mod cdr;
-pub mod rmw_dds_common;
-
-mod action;
-mod interface;
-mod livox;
-mod registry;
-mod time;
-mod type_hash;
-
 /// Modules of the packages whose messages `lattice_msgs_generator` made in the build script of the crate.
 ///
 /// ```text
@@ -56,69 +46,15 @@ macro_rules! include_messages {
     };
 }
 
-/// Modules of packages, and a visitor of all their messages.
-macro_rules! packages {
-    ($($(#[$attribute:meta])* $package:ident,)*) => {
-        include_messages! { $($(#[$attribute])* $package),* }
-
-        fn visit_packages(visitor: &mut impl MessageVisitor) {
-            $($package::visit_messages(visitor);)*
-        }
-    };
-}
-
-packages! {
-    /// Messages common to all actions: goals, their states, their cancellation.
-    action_msgs,
-    /// Time and duration.
-    builtin_interfaces,
-    /// States of nodes.
-    diagnostic_msgs,
-    /// Geographic positions and poses.
-    geographic_msgs,
-    /// Positions, rotations, poses, velocities and transforms.
-    geometry_msgs,
-    /// Messages of Lattice (package `lattice_msgs`): maps, and the calibration of a headset.
-    lattice,
-    /// States of managed nodes and their transitions.
-    lifecycle_msgs,
-    /// Messages of livox_interfaces.
-    livox_interfaces,
-    /// Messages of livox_ros_driver.
-    livox_ros_driver,
-    /// Messages of livox_ros_driver2.
-    livox_ros_driver2,
-    /// Updates of occupancy grids.
-    map_msgs,
-    /// Odometry, paths and occupancy grids.
-    nav_msgs,
-    /// Inertial solution of the NovAtel OEM7 driver (ROS 2 branches).
-    novatel_oem7_msgs,
-    /// Octrees of octomap_server, and its calls.
-    octomap_msgs,
-    /// Log and parameters of nodes.
-    rcl_interfaces,
-    /// Services of rosbag2's player and recorder.
-    rosbag2_interfaces,
-    /// Simulated time.
-    rosgraph_msgs,
-    /// Point clouds, laser scans, images, inertial and satellite measurements.
-    sensor_msgs,
-    /// Header, colour and plain values.
-    std_msgs,
-    /// Calls of common use.
-    std_srvs,
-    /// The frame tree.
-    tf2_msgs,
-    /// Descriptions of types.
-    type_description_interfaces,
-    /// Identifiers.
-    unique_identifier_msgs,
-    /// Meaning of labels.
-    vision_msgs,
-    /// Markers, in the layout of Humble and later.
-    visualization_msgs,
-}
+mod action;
+pub mod cdr;
+mod interface;
+mod livox;
+mod packages;
+mod registry;
+pub mod rmw_dds_common;
+mod time;
+mod type_hash;
 
 /// Names that generated code uses.
 #[doc(hidden)]
@@ -129,8 +65,13 @@ pub mod generated {
 }
 
 pub use action::RosAction;
-pub use interface::{RosMessage, RosService, Schema, dds_type_name};
-pub use registry::{
-    MessageVisitor, definition_of, hash_of, know_message, know_service, schema_of, visit_messages,
+pub use interface::{MessageVisitor, RosMessage, RosService, Schema, dds_type_name};
+pub use packages::{
+    action_msgs, builtin_interfaces, diagnostic_msgs, geographic_msgs, geometry_msgs, lattice,
+    lifecycle_msgs, livox_interfaces, livox_ros_driver, livox_ros_driver2, map_msgs, nav_msgs,
+    novatel_oem7_msgs, octomap_msgs, rcl_interfaces, rosbag2_interfaces, rosgraph_msgs,
+    sensor_msgs, std_msgs, std_srvs, tf2_msgs, type_description_interfaces, unique_identifier_msgs,
+    vision_msgs, visualization_msgs,
 };
+pub use registry::{definition_of, hash_of, know_message, know_service, schema_of, visit_messages};
 pub use type_hash::{type_description, type_hash};

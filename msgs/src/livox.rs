@@ -1,6 +1,6 @@
 //! Messages of the ROS drivers of Livox lidars: one layout under three package names.
 
-use crate::{livox_interfaces, livox_ros_driver, livox_ros_driver2};
+use crate::packages::{livox_interfaces, livox_ros_driver, livox_ros_driver2};
 
 /// Converts the messages of an earlier package to those of the current one.
 macro_rules! into_driver2 {

@@ -3,15 +3,10 @@
 use std::collections::HashMap;
 use std::sync::{LazyLock, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
-use crate::interface::{RosMessage, RosService, Schema};
+use crate::interface::{MessageVisitor, RosMessage, RosService, Schema};
+use crate::packages::visit_packages;
+use crate::rmw_dds_common;
 use crate::type_hash::{service_hash, type_hash};
-use crate::{rmw_dds_common, visit_packages};
-
-/// Visitor of every message type; see [`visit_messages`].
-pub trait MessageVisitor {
-    /// Called once for each type.
-    fn visit<M: RosMessage>(&mut self);
-}
 
 /// Passes every message, and every part of a service or an action, to the visitor.
 pub fn visit_messages(visitor: &mut impl MessageVisitor) {

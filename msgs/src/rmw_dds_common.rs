@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{MessageVisitor, RosMessage, Schema};
+use crate::interface::{MessageVisitor, RosMessage, Schema};
 
 /// GID of an endpoint or a participant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,6 +1,6 @@
 //! Conversions between nanoseconds and the two-part times of ROS.
 
-use crate::builtin_interfaces::{Duration, Time};
+use crate::packages::builtin_interfaces::{Duration, Time};
 
 const NS_PER_S: i64 = 1_000_000_000;
 

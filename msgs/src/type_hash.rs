@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 
 use hmac_sha256::Hash;
 
-use crate::RosMessage;
-use crate::builtin_interfaces::Time;
+use crate::interface::RosMessage;
 use crate::interface::Schema;
-use crate::type_description_interfaces::{
+use crate::packages::builtin_interfaces::Time;
+use crate::packages::type_description_interfaces::{
     Field, FieldType, IndividualTypeDescription, TypeDescription,
 };
 

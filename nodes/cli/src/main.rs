@@ -140,7 +140,7 @@ impl Command {
             Command::Fleet(command) => command.run(),
             Command::About(command) => command.run(),
             #[cfg(feature = "pages")]
-            Command::Pages(command) => command.run(),
+            Command::Pages(command) => command.run(<Cli as clap::CommandFactory>::command()),
             #[cfg(feature = "lab")]
             Command::Lab(command) => command.run(),
         }

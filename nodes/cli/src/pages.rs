@@ -3,10 +3,10 @@
 use std::fs::create_dir_all;
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
-use crate::{Cli, CliResult};
+use crate::CliResult;
 
 /// Options of `lattice pages`.
 #[derive(Args)]
@@ -16,11 +16,11 @@ pub struct Pages {
 }
 
 impl Pages {
-    /// Runs the command.
-    pub fn run(self) -> CliResult {
+    /// Writes the pages and completions of `lattice`, whose command this is.
+    pub fn run(self, mut lattice: Command) -> CliResult {
         let man = self.dir.join("man/man1");
         create_dir_all(&man)?;
-        clap_mangen::generate_to(Cli::command(), &man)?;
+        clap_mangen::generate_to(lattice.clone(), &man)?;
         // The names that Debian's shells look for.
         for (shell, folder) in [
             (Shell::Bash, "bash-completion/completions"),
@@ -29,8 +29,7 @@ impl Pages {
         ] {
             let folder = self.dir.join(folder);
             create_dir_all(&folder)?;
-            let written =
-                clap_complete::generate_to(shell, &mut Cli::command(), "lattice", &folder)?;
+            let written = clap_complete::generate_to(shell, &mut lattice, "lattice", &folder)?;
             if shell == Shell::Bash {
                 std::fs::rename(written, folder.join("lattice"))?;
             }

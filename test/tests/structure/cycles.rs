@@ -125,7 +125,7 @@ fn use_tree(
 /// Files of a crate by the paths of their modules.
 struct Crate(BTreeMap<Names, File>);
 
-/// What a path leads to.
+/// Target of a path.
 #[derive(Clone, PartialEq)]
 enum Target {
     Module(Names),
@@ -194,7 +194,7 @@ impl Crate {
         file.is_some_and(|file| file.imports.iter().any(|(_, here, _)| here == name))
     }
 
-    /// What a name means in a module.
+    /// Target of a name in a module.
     fn named(&self, module: &Names, name: &str, seen: &mut Vec<(Names, String)>) -> Option<Target> {
         let file = self.0.get(module)?;
         let key = (module.clone(), name.to_owned());
@@ -328,7 +328,8 @@ fn file_of(source: &Path, module: &[String]) -> std::path::PathBuf {
 }
 
 /// Crates, and the number of their files that are in cycles. A number may fall, not rise.
-const CRATES: [(&str, usize); 6] = [
+const CRATES: [(&str, usize); 7] = [
+    ("msgs/src", 0),
     ("lattice_core/src", 4),
     ("nodes/src", 118),
     ("nodes/runtime/src", 0),
