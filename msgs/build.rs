@@ -1,15 +1,18 @@
 //! Makes the structs of the messages from their texts.
 
+use std::env;
 use std::error::Error;
 use std::ffi::OsStr;
 use std::fs;
+use std::path::Path;
 
 use lattice_msgs_generator::Generator;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut generator = Generator::new().inside_lattice_msgs();
-    for kind in ["msg", "srv", "action"] {
-        println!("cargo::rerun-if-changed={kind}");
+    // Not the whole folder, as `generate` would say: other files of this crate do not matter.
+    for folder in ["msg", "srv", "action", "definitions"] {
+        println!("cargo::rerun-if-changed={folder}");
     }
     // The texts of this package, which lie as colcon wants them.
     generator = generator.package("lattice_msgs", ".");
@@ -27,6 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     generator = generator
         .package("livox_ros_driver", livox)
         .package("livox_interfaces", livox);
-    generator.generate()?;
+    let out = env::var_os("OUT_DIR").ok_or("OUT_DIR is not set")?;
+    generator.write_to(Path::new(&out))?;
     Ok(())
 }
