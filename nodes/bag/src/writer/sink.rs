@@ -1,10 +1,6 @@
 //! Storage of a bag writer, with the options and topics that it takes.
 
-use std::{
-    error::Error,
-    io::{self},
-    path::Path,
-};
+use std::{error::Error, io, path::Path};
 
 use mcap::McapError;
 
