@@ -323,6 +323,8 @@ fn a_log_that_plays_is_held_and_moved_from_the_page_of_a_phone() {
     // The bar goes from the beginning of the log to its end, and to where a person drags it.
     let (first_s, last_s) = (first_ns as f64 * 1e-9, last_ns as f64 * 1e-9);
     let at = |page: &mut Page| page.value("lattice.player.log.now").as_f64().unwrap();
+    // Times of the log come on a topic of their own, which may be discovered after the services.
+    page.wait_for("lattice.player.log !== null");
     let ends = "[lattice.player.log.begin, lattice.player.log.end]";
     let ends: [f64; 2] = serde_json::from_value(page.value(ends)).unwrap();
     assert!((ends[0] - first_s).abs() < 1e-3 && (ends[1] - last_s).abs() < 1e-3);
