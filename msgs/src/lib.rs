@@ -66,12 +66,6 @@ pub mod generated {
 
 pub use action::RosAction;
 pub use interface::{MessageVisitor, RosMessage, RosService, Schema, dds_type_name};
-pub use packages::{
-    action_msgs, builtin_interfaces, diagnostic_msgs, geographic_msgs, geometry_msgs, lattice,
-    lifecycle_msgs, livox_interfaces, livox_ros_driver, livox_ros_driver2, map_msgs, nav_msgs,
-    novatel_oem7_msgs, octomap_msgs, rcl_interfaces, rosbag2_interfaces, rosgraph_msgs,
-    sensor_msgs, std_msgs, std_srvs, tf2_msgs, type_description_interfaces, unique_identifier_msgs,
-    vision_msgs, visualization_msgs,
-};
+pub use packages::*;
 pub use registry::{definition_of, hash_of, know_message, know_service, schema_of, visit_messages};
 pub use type_hash::{type_description, type_hash};

@@ -23,7 +23,7 @@ pub fn default(kind: &Kind, value: &str) -> Result<Option<String>, String> {
     };
     let Some(list) = value.strip_prefix('[') else {
         let is_zero = match &kind.element {
-            _ if kind.array != Array::One => return Err(format!("`{value}`: a list is due")),
+            _ if kind.array != Array::One => return Err(format!("`{value}`: expected a list")),
             Element::String => unquoted(value).is_empty(),
             _ => matches!(element(value)?.as_str(), "0" | "0.0" | "-0.0" | "false"),
         };
@@ -43,9 +43,9 @@ pub fn default(kind: &Kind, value: &str) -> Result<Option<String>, String> {
     let values = values.map(element).collect::<Result<Vec<_>, _>>()?;
     let list = values.join(", ");
     match kind.array {
-        Array::One => Err(format!("`{value}`: a list, where one value is due")),
+        Array::One => Err(format!("`{value}`: expected one value, no list")),
         Array::Fixed(length) if length == values.len() => Ok(Some(format!("[{list}]"))),
-        Array::Fixed(length) => Err(format!("{} values of {length}", values.len())),
+        Array::Fixed(length) => Err(format!("{} values, expected {length}", values.len())),
         Array::Sequence if values.is_empty() => Ok(None),
         Array::Sequence => Ok(Some(format!("::std::vec![{list}].into()"))),
     }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::GenerateError;
-use crate::definition::{Definition, Message, parse};
+use crate::definition::{Definition, Message};
 use crate::documentation::{add_doc, doc};
 use crate::names::Names;
 use crate::package::{File, Package};
@@ -190,10 +190,8 @@ impl<'a> Writer<'a> {
         let mut names = Vec::new();
         for (part, half, text) in ACTION_PARTS {
             let text = text.replace("ACTION", &format!("{here}/{name}"));
-            let parsed = parse(&text, "msg").map_err(|(line, text)| file.fault(line, text))?;
-            let Definition::Message(message) = parsed else {
-                continue;
-            };
+            let message = Message::parse(&text);
+            let message = message.map_err(|(line, text)| file.fault(line, text))?;
             let title = match half {
                 "" => format!("Message of `_action/feedback` of [`{name}Action`]."),
                 _ => format!("{} of [`{name}{part}`].", half.trim_start_matches('_')),

@@ -99,7 +99,13 @@ impl Run {
             running.start(&runtime, name, *start, executables::reader_of(name))?;
         }
         if let Some(manager) = env::var_os("NOTIFY_SOCKET") {
-            ready(&manager).map_err(|e| format!("NOTIFY_SOCKET={}: {e}", manager.display()))?;
+            // The variable may be of a service whose socket is not reached from here, as in a container.
+            if let Err(error) = ready(&manager) {
+                log::warn!(
+                    "the service manager does not learn that the nodes have started: NOTIFY_SOCKET={}: {error}",
+                    manager.display()
+                );
+            }
         }
         running.until_stopped(&runtime)
     }

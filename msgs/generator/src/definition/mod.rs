@@ -77,35 +77,29 @@ pub enum Array {
     Sequence,
 }
 
+/// Kind of a declaration.
+#[derive(Clone, Copy)]
+enum Declared {
+    Constant,
+    Field,
+}
+
 /// Fault of a definition: line from 1, and reason.
 pub type Fault = (usize, String);
 
 /// Reads the text of a file with the ending `msg`, `srv` or `action`.
 pub fn parse(text: &str, ending: &str) -> Result<Definition, Fault> {
-    let mut parts = vec![Message::default()];
-    let mut first_lines = vec![1];
-    let mut texts = vec![Vec::new()];
-    for (number, line) in (1..).zip(text.lines()) {
-        match line.trim_end() == "---" {
-            true => {
-                parts.push(Message::default());
-                first_lines.push(number + 1);
-                texts.push(Vec::new());
-            }
-            false => texts.last_mut().into_iter().for_each(|t| t.push(line)),
-        }
-    }
-    for ((part, first), lines) in parts.iter_mut().zip(&first_lines).zip(&texts) {
-        part.text = lines.iter().map(|line| format!("{line}\n")).collect();
-        part.read(lines, *first)?;
+    let lines: Vec<&str> = text.lines().collect();
+    let (mut parts, mut first, mut next) = (Vec::new(), 1, 1);
+    for lines in lines.split(|line| line.trim_end() == "---") {
+        first = next;
+        parts.push(Message::read(lines, first)?);
+        next = first + lines.len() + 1;
     }
     let number = parts.len();
-    let wrong = |wanted| {
-        let last = first_lines.last().copied().unwrap_or(1);
-        (
-            last,
-            format!("{number} parts divided by ---, {wanted} are due"),
-        )
+    let wrong = |expected| {
+        let reason = format!("{number} parts divided by ---, expected {expected}");
+        (first, reason)
     };
     match ending {
         "srv" => Ok(Definition::Service(parts.try_into().map_err(|_| wrong(2))?)),
@@ -118,7 +112,17 @@ pub fn parse(text: &str, ending: &str) -> Result<Definition, Fault> {
 }
 
 impl Message {
-    fn read(&mut self, lines: &[&str], first: usize) -> Result<(), Fault> {
+    /// Reads the definition of a message alone.
+    pub fn parse(text: &str) -> Result<Self, Fault> {
+        Self::read(&text.lines().collect::<Vec<_>>(), 1)
+    }
+
+    /// Reads lines, of which the first has the number `first` in its file.
+    fn read(lines: &[&str], first: usize) -> Result<Self, Fault> {
+        let mut message = Self {
+            text: lines.iter().map(|line| format!("{line}\n")).collect(),
+            ..Self::default()
+        };
         let mut above = Comment::new();
         let (mut is_head, mut last) = (true, None);
         for (number, line) in (first..).zip(lines) {
@@ -127,22 +131,24 @@ impl Message {
             match comment {
                 _ if !code.is_empty() => {
                     if is_head {
-                        self.comment = std::mem::take(&mut above);
+                        message.comment = std::mem::take(&mut above);
                         is_head = false;
                     }
                     let mut text = std::mem::take(&mut above);
                     text.extend(comment.map(str::to_owned));
-                    last = Some(self.declare(code, text, number)?);
+                    last = Some(message.declare(code, text, number)?);
                 }
                 // An indented comment continues that of the line above it.
-                Some(comment) if line.starts_with(char::is_whitespace) && last.is_some() => {
-                    self.comment_of(last).push(comment.to_owned());
+                Some(comment) => {
+                    let is_indented = line.starts_with(char::is_whitespace);
+                    let of_last = last.filter(|_| is_indented);
+                    let lines = of_last.and_then(|kind| message.last_comment(kind));
+                    lines.unwrap_or(&mut above).push(comment.to_owned());
                 }
-                Some(comment) => above.push(comment.to_owned()),
                 None => {
                     // An empty line ends the comment of the message, and parts other comments from a field.
                     if is_head && !above.is_empty() {
-                        self.comment = std::mem::take(&mut above);
+                        message.comment = std::mem::take(&mut above);
                         is_head = false;
                     }
                     above.clear();
@@ -151,32 +157,25 @@ impl Message {
             }
         }
         if is_head {
-            self.comment = above;
+            message.comment = above;
         }
-        Ok(())
+        Ok(message)
     }
 
-    /// Comment of a constant (true) or field (false) by its place.
-    fn comment_of(&mut self, declared: Option<(bool, usize)>) -> &mut Comment {
-        let found = match declared {
-            Some((true, at)) => self.constants.get_mut(at).map(|c| &mut c.comment),
-            Some((false, at)) => self.fields.get_mut(at).map(|f| &mut f.comment),
-            None => None,
-        };
-        found.unwrap_or(&mut self.comment)
+    /// Comment of the last declaration of a kind.
+    fn last_comment(&mut self, kind: Declared) -> Option<&mut Comment> {
+        match kind {
+            Declared::Constant => self.constants.last_mut().map(|last| &mut last.comment),
+            Declared::Field => self.fields.last_mut().map(|last| &mut last.comment),
+        }
     }
 
-    /// Adds a field or a constant; true for a constant, and its place.
-    fn declare(
-        &mut self,
-        code: &str,
-        comment: Comment,
-        line: usize,
-    ) -> Result<(bool, usize), Fault> {
+    /// Adds a field or a constant.
+    fn declare(&mut self, code: &str, comment: Comment, line: usize) -> Result<Declared, Fault> {
         let fault = |reason: String| (line, reason);
         let (kind, rest) = code
             .split_once(char::is_whitespace)
-            .ok_or_else(|| fault(format!("`{code}`: a type and a name are due")))?;
+            .ok_or_else(|| fault(format!("`{code}`: expected a type and a name")))?;
         let rest = rest.trim_start();
         let end = rest.find(|c: char| c == '=' || c.is_whitespace());
         let (name, value) = rest.split_at(end.unwrap_or(rest.len()));
@@ -210,7 +209,7 @@ impl Message {
                 comment,
                 line,
             });
-            return Ok((true, self.constants.len() - 1));
+            return Ok(Declared::Constant);
         }
         let default = (!value.is_empty()).then(|| value.to_owned());
         self.fields.push(Field {
@@ -220,7 +219,7 @@ impl Message {
             comment,
             line,
         });
-        Ok((false, self.fields.len() - 1))
+        Ok(Declared::Field)
     }
 }
 
@@ -253,8 +252,12 @@ impl Element {
             Some((name, bound)) => (name, Some(bound)),
             None => (text, None),
         };
-        if bound.is_some() && name != "string" {
-            return Err(format!("`{text}`: only strings have such a bound"));
+        if let Some(bound) = bound {
+            return match name {
+                "string" if bound.parse::<usize>().is_ok() => Ok(Self::String),
+                "string" => Err(format!("`{text}`: `{bound}` is no length")),
+                _ => Err(format!("`{text}`: only strings have such a bound")),
+            };
         }
         let primitive = match name {
             "bool" => "bool",
@@ -268,13 +271,8 @@ impl Element {
             "uint64" => "u64",
             "float32" => "f32",
             "float64" => "f64",
-            "string" if bound.is_none_or(|b| b.parse::<usize>().is_ok()) => {
-                return Ok(Self::String);
-            }
+            "string" => return Ok(Self::String),
             "wstring" => return Err("`wstring` is not supported: use `string`".to_owned()),
-            _ if bound.is_some() => {
-                return Err(format!("`{text}`: only strings have such a bound"));
-            }
             _ => {
                 let (package, name) = match name.split_once('/') {
                     Some((package, name)) => {

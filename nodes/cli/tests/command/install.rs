@@ -1,4 +1,4 @@
-//! What packages rely on: licences, the report to a service manager, and places of files.
+//! Needs of packages: licences, the report to a service manager, and places of files.
 
 use std::fs;
 use std::os::unix::net::UnixDatagram;
