@@ -31,6 +31,7 @@ pub use kind::LatticeKind;
 pub use morton_key::MortonKey;
 pub use named_orientation::Orientation;
 pub use scaled_lattice::Lattice;
+pub(crate) use voronoi::corners;
 pub use voronoi::{CellFace, VoronoiCell};
 
 #[cfg(test)]

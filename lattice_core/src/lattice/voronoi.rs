@@ -78,8 +78,8 @@ fn on_plane(normal: &Vector3<f64>, p: &Vector3<f64>) -> bool {
     (normal.dot(p) - 0.5 * normal.norm_squared()).abs() <= SLACK * normal.norm_squared()
 }
 
-/// Points on three planes that satisfy all others, each once.
-fn corners(normals: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+/// Corners of the polyhedron `n . x <= |n|^2 / 2` for all normals `n`, each once.
+pub(crate) fn corners(normals: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let mut found: Vec<Vector3<f64>> = Vec::new();
     for (i, a) in normals.iter().enumerate() {
         for (j, b) in normals.iter().enumerate().skip(i + 1) {

@@ -1,22 +1,26 @@
-//! Stencils of the cells that block a ball at the centre of a cell and on a step to the next.
-
-use rustc_hash::FxHashSet;
+//! Cells at which a ball fits, and steps on which it fits all the way.
 
 use super::Segment;
 use super::clearance::cell_distance_m;
 use super::limits::MAX_ROBOT_CELLS;
 use super::path_error::PathError;
 use super::shells::{add, steps_within};
-use crate::lattice::{Lattice, LatticeIndex, MortonKey};
+use super::stencil::{Around, Stencil};
+use crate::lattice::{Lattice, LatticeIndex};
 use crate::voxels::VoxelStore;
 
+/// Sets of the cells that block a ball on a lattice or on every n-th point of it along each basis vector.
 pub(super) struct Corridor {
-    /// Cells that touch the ball at the centre of cell 0, nearest first.
-    at: Vec<LatticeIndex>,
-    /// Index difference and length of each step.
+    /// Distance of the places of the ball along the basis vectors, cells.
+    pub(super) stride: i32,
+    /// Index difference, in strides, and length of each step, metres.
     pub(super) steps: Vec<(LatticeIndex, f64)>,
-    /// For each step, cells that touch the ball between its ends only.
-    between: Vec<Vec<LatticeIndex>>,
+    /// Cells that touch the ball at the centre of cell 0.
+    pub(super) ball: Stencil,
+    /// Cells that touch the ball on each step from cell 0.
+    pub(super) ways: Vec<Stencil>,
+    /// Cells of the ball and of all steps.
+    pub(super) all: Stencil,
 }
 
 impl Corridor {
@@ -24,6 +28,7 @@ impl Corridor {
         lattice: &Lattice,
         radius_m: f64,
         steps: &[LatticeIndex],
+        stride: i32,
     ) -> Result<Corridor, PathError> {
         let covering_m = lattice.covering_radius_m();
         // Cells are within a covering radius of the ball; see below for the slack.
@@ -31,39 +36,35 @@ impl Corridor {
         check_size(lattice, radius_m, reach_m)?;
         // Contact blocks; the slack makes that independent of rounding.
         let blocked_m = radius_m + 1e-9 * covering_m;
-        let touching = |line: &Segment, reach_m: f64| -> Vec<LatticeIndex> {
-            let near = steps_within(lattice, reach_m)
-                .into_iter()
-                .map(|step| step.by);
-            let distance_m = |w| cell_distance_m(line, lattice.cell(), &lattice.center(w));
+        let touching = |to: LatticeIndex| -> Vec<LatticeIndex> {
+            let (from_m, to_m) = (lattice.center([0; 3]), lattice.center(to));
+            let line = Segment { from_m, to_m };
+            let near = steps_within(lattice, reach_m + to_m.norm()).into_iter();
+            let distance_m = |w| cell_distance_m(&line, lattice.cell(), &lattice.center(w));
+            let near = near.map(|step| step.by);
             near.filter(|&w| distance_m(w) <= blocked_m).collect()
         };
-        let zero = lattice.center([0; 3]);
-        let way = |to: LatticeIndex| Segment {
-            from_m: zero,
-            to_m: lattice.center(to),
-        };
-        let at = touching(&way([0; 3]), reach_m);
-        let ball: FxHashSet<LatticeIndex> = at.iter().copied().collect();
-        let between = |&to: &LatticeIndex| -> Vec<LatticeIndex> {
+        let ball = touching([0; 3]);
+        let way = |&to: &LatticeIndex| -> Vec<LatticeIndex> {
             let back = to.map(|w| -w);
+            if to > back {
+                return touching(to);
+            }
             // One direction decides for both, so that paths are reversible.
-            let forward = if to > back { to } else { back };
-            let line = way(forward);
-            let cells = touching(&line, reach_m + line.to_m.norm());
-            let behind = forward.map(|w| -w);
-            let new = |w: &LatticeIndex| !ball.contains(w) && !ball.contains(&add(*w, behind));
-            let shift = if to == forward { [0; 3] } else { to };
-            let cells = cells.into_iter().filter(new);
-            cells.map(|w| add(w, shift)).collect()
+            let cells = touching(back).into_iter();
+            cells.map(|w| add(w, to)).collect()
         };
+        let cells = |step: &LatticeIndex| step.map(|w| stride * w);
+        let ways: Vec<_> = steps.iter().map(|step| way(&cells(step))).collect();
         Ok(Corridor {
-            at,
-            between: steps.iter().map(between).collect(),
+            all: Stencil::new(ways.iter().chain([&ball]).flatten().copied()),
+            ball: Stencil::new(ball),
+            ways: ways.into_iter().map(Stencil::new).collect(),
             steps: steps
                 .iter()
-                .map(|&to| (to, lattice.center(to).norm()))
+                .map(|step| (*step, lattice.center(cells(step)).norm()))
                 .collect(),
+            stride,
         })
     }
 
@@ -77,20 +78,14 @@ impl Corridor {
         Ok(steps.into_iter().map(|step| step.by).collect())
     }
 
-    /// Tests whether the ball fits at the centre of a cell.
-    pub(super) fn is_clear(&self, store: &impl VoxelStore, w: LatticeIndex) -> bool {
-        none_occupied(store, w, &self.at)
-    }
-
-    /// Tests whether the ball, which fits at both ends, fits between them.
-    pub(super) fn is_way_clear(
-        &self,
-        store: &impl VoxelStore,
-        w: LatticeIndex,
-        step: usize,
-    ) -> bool {
-        let between = self.between.get(step);
-        between.is_some_and(|between| none_occupied(store, w, between))
+    /// Occupied cells about the places of a block.
+    pub(super) fn around(&self, store: &impl VoxelStore, first: LatticeIndex) -> Around {
+        let [low, mut high] = self.all.blocks();
+        if self.stride > 1 {
+            // The first place may be any cell of its block.
+            high = high.map(|i| i + (7 * self.stride + 7) / 8);
+        }
+        Around::new(first, [low, high], |block| store.block_mask(block))
     }
 }
 
@@ -101,10 +96,4 @@ fn check_size(lattice: &Lattice, radius_m: f64, reach_m: f64) -> Result<(), Path
         return Err(PathError::Radius { radius_m, cells });
     }
     Ok(())
-}
-
-fn none_occupied(store: &impl VoxelStore, w: LatticeIndex, around: &[LatticeIndex]) -> bool {
-    let occupied =
-        |by: &LatticeIndex| MortonKey::pack(add(w, *by)).is_some_and(|k| store.contains(k));
-    !around.iter().any(occupied)
 }

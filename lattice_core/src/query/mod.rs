@@ -7,10 +7,13 @@
 //! Results are exact up to the rounding of f64 and independent of the number of threads and of earlier queries. Of
 //! equal distances the lower key wins.
 
+mod bounds;
+mod cell_search;
 mod center_tree;
 mod clearance;
 mod corridor;
 mod error;
+mod free_places;
 mod gjk;
 mod limits;
 mod map_query;
@@ -20,6 +23,9 @@ mod path_error;
 mod search;
 mod segment;
 mod shells;
+mod stencil;
+mod step_length;
+mod straight_path;
 mod tree;
 
 use std::sync::{Arc, OnceLock};
@@ -29,12 +35,13 @@ use nalgebra::Vector3;
 use crate::lattice::MortonKey;
 use crate::voxels::VoxelStore;
 
+pub use bounds::Bounds;
 pub use center_tree::PreparedNearest;
 pub use clearance::Clearance;
 pub use error::QueryError;
 pub use limits::MAX_ROBOT_CELLS;
 pub use nearest::Neighbor;
-pub use path::{Bounds, Path, PathError, PathOptions, Steps};
+pub use path::{Path, PathError, PathOptions, Steps};
 pub use segment::Segment;
 pub use shells::Shells;
 

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::{InsertReport, Region};
 use crate::cloud::Cloud;
-use crate::lattice::{Lattice, LatticeIndex, MortonKey};
+use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
 
 /// Store of occupied voxels of a lattice whose indices count from a datum in the map frame.
 ///
@@ -30,6 +30,21 @@ pub trait VoxelStore: Sync {
     #[inline]
     fn holds(&self, w: LatticeIndex) -> bool {
         MortonKey::pack(w).is_some_and(|key| self.contains(key))
+    }
+
+    /// Occupied cells of a block by its number ([`BlockKey::block`]): bit `place % 64` of word `place / 64` for each
+    /// [`BlockKey::place`].
+    fn block_mask(&self, block: u64) -> [u64; 8] {
+        let mut mask = [0; 8];
+        for (first, word) in (0..).step_by(64).zip(&mut mask) {
+            for bit in 0..64 {
+                let code =
+                    BlockKey::from_raw(block.saturating_mul(512).saturating_add(first + bit));
+                let key = code.and_then(BlockKey::key);
+                *word |= u64::from(key.is_some_and(|key| self.contains(key))) << bit;
+            }
+        }
+        mask
     }
 
     /// All occupied cells in ascending (Morton) order.

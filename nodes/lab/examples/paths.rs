@@ -1,12 +1,14 @@
 //! Compares shortest paths across lattices of equal cell volume in random worlds of balls.
 //!
 //! `cargo run -p lattice_lab --example paths [WORLDS]`
+//!
+//! `cargo run --release -p lattice_lab --example paths town`: paths of 150 m through a town of 0.1 m cells, timed.
 #![allow(clippy::unwrap_used)]
 
 use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::query::{Bounds, PathError, PathOptions, Query, Steps};
-use lattice_core::voxels::VoxelList;
+use lattice_core::voxels::{OccupancyList, VoxelList, VoxelStore};
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -111,7 +113,91 @@ fn length_m(path_m: &[Vector3<f64>]) -> f64 {
     path_m.windows(2).map(|p| (p[1] - p[0]).norm()).sum()
 }
 
+/// Streets between blocks of houses of 12 m by 12 m, each with an open side and a yard, 200 m by 120 m. Walls with
+/// gates of 1.5 m close all streets.
+fn town(lattice: &Lattice) -> OccupancyList {
+    let mut cells = OccupancyList::at_datum(lattice.clone(), [0; 3], usize::MAX);
+    let step = 0.7 * lattice.cell_side_m();
+    let mut fill = |from: [f64; 3], to: [f64; 3]| {
+        let n = [0, 1, 2].map(|axis| ((to[axis] - from[axis]) / step).ceil() as i32);
+        for i in 0..=n[0] {
+            for j in 0..=n[1] {
+                for k in 0..=n[2] {
+                    let by = Vector3::from([i, j, k].map(f64::from)) * step;
+                    cells.add(cells.key_of(&(Vector3::from(from) + by)).unwrap());
+                }
+            }
+        }
+    };
+    fill([-100.0, -60.0, 0.0], [100.0, 60.0, 0.0]);
+    for (column, row) in (0..60).map(|i| (i % 10, i / 10)) {
+        let (x, y) = (
+            -98.0 + 20.0 * f64::from(column),
+            -56.0 + 20.0 * f64::from(row),
+        );
+        let height = 4.0 + f64::from((7 * column + 5 * row) % 6);
+        let (gate_x, gate_y) = (
+            x + 14.0 + f64::from(row % 3),
+            y + 15.0 + f64::from(column % 2),
+        );
+        let mut wall = |from: [f64; 2], to: [f64; 2]| {
+            fill([from[0], from[1], 0.0], [to[0], to[1], height]);
+        };
+        wall([x, y], [x + 12.0, y]);
+        wall([x, y + 12.0], [x + 12.0, y + 12.0]);
+        wall([x, y], [x, y + 12.0]);
+        wall([x + 12.0, y], [x + 12.0, y + 4.0]);
+        wall([x + 12.0, y + 6.0], [x + 12.0, y + 12.0]);
+        wall([x + 12.0, y + 3.0], [gate_x, y + 3.0]);
+        wall([gate_x + 1.5, y + 3.0], [x + 20.0, y + 3.0]);
+        wall([x + 3.0, y + 12.0], [x + 3.0, gate_y]);
+        wall([x + 3.0, gate_y + 1.5], [x + 3.0, y + 20.0]);
+        fill([x, y, height], [x + 6.0, y + 12.0, height]);
+    }
+    cells
+}
+
+/// Times paths of a ball of 0.4 m through the town, below 2 m and above the roofs as well.
+fn time_in_town() {
+    println!("| lattice | voxels | below m | search | length m | cells expanded | s |");
+    println!("|---|---|---|---|---|---|---|");
+    for kind in LatticeKind::ALL {
+        let cells = town(&Lattice::new(kind, 0.001).unwrap());
+        let query = Query::new(&cells);
+        for top_m in [2.0, 20.0] {
+            let options = PathOptions {
+                radius_m: 0.4,
+                steps: Steps::Touching,
+                bounds: Some(Bounds {
+                    min_m: Vector3::new(-100.0, -60.0, 0.0),
+                    max_m: Vector3::new(100.0, 60.0, top_m),
+                }),
+                max_expanded: 20_000_000,
+            };
+            let ends = [[-70.0, -38.0, 1.0], [70.0, 22.0, 1.0]].map(Vector3::from);
+            for name in ["straight", "shortest"] {
+                let begin = Instant::now();
+                let path = match name {
+                    "straight" => query.straight_path(&ends[0], &ends[1], &options).unwrap(),
+                    _ => query.shortest_path(&ends[0], &ends[1], &options).unwrap(),
+                };
+                let short = query.shorten(&path.centers_m, 0.4).unwrap();
+                println!(
+                    "| {kind} | {} | {top_m} | {name} | {:.2} | {} | {:.2} |",
+                    cells.len(),
+                    length_m(&short),
+                    path.expanded,
+                    begin.elapsed().as_secs_f64(),
+                );
+            }
+        }
+    }
+}
+
 fn main() {
+    if std::env::args().nth(1).as_deref() == Some("town") {
+        return time_in_town();
+    }
     let count = std::env::args().nth(1).map_or(100, |n| n.parse().unwrap());
     let searches: Vec<_> = LatticeKind::ALL
         .into_iter()

@@ -15,8 +15,8 @@ use super::LatticeMapper;
 use super::operations::vector;
 use super::services::{BUSY, spawn};
 
-/// Limits of a search: expanded cells and time.
-const MAX_EXPANDED: usize = 300_000;
+/// Limits of a search: expanded cells, some three seconds of them, and time.
+const MAX_EXPANDED: usize = 2_000_000;
 const PATIENCE: Duration = Duration::from_secs(3);
 /// Limit of cells within the ball of a request, and within the tolerance of an end.
 const MAX_BALL_CELLS: f64 = 8192.0;
@@ -153,7 +153,7 @@ fn find(
         bounds: None,
         max_expanded: MAX_EXPANDED,
     };
-    let path = query.shortest_path_while(&start_m, &goal_m, &options, go_on);
+    let path = query.straight_path_while(&start_m, &goal_m, &options, go_on);
     path.map_err(|error| match error {
         PathError::Limit { expanded } => {
             format!("no path found after {expanded} cells: the search limit is reached")

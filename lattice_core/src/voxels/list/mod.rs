@@ -288,6 +288,12 @@ impl VoxelStore for VoxelList {
         VoxelList::contains(self, key)
     }
 
+    fn block_mask(&self, block: u64) -> [u64; 8] {
+        let code = BlockKey::from_raw(block.saturating_mul(512));
+        let shard = code.and_then(|code| self.shard(code));
+        shard.map_or([0; 8], |shard| shard.block_mask(block))
+    }
+
     fn mean_m(&self, key: MortonKey) -> Option<Vector3<f64>> {
         let voxel = self.get(key)?;
         Some(self.center_m(key) + Vector3::from(voxel.mean_offset_m()))

@@ -204,6 +204,12 @@ impl VoxelStore for OccupancyList {
         BlockKey::pack(w).is_some_and(|code| self.has(code))
     }
 
+    fn block_mask(&self, block: u64) -> BlockMask {
+        let number = self.blocks.find(block);
+        let block = number.and_then(|number| self.blocks.rows().get(number as usize));
+        block.map_or([0; 8], |block| block.leaf)
+    }
+
     fn sorted_keys(&self) -> Vec<MortonKey> {
         let blocks = self.blocks.rows().iter();
         block_mask::sorted_keys(blocks.map(|block| (block.code, &block.leaf)), self.len)

@@ -172,6 +172,13 @@ impl CellTable {
         self.blocks.rows().get(block as usize)?.find(code.place())
     }
 
+    /// Cells of a block that have a voxel.
+    pub(crate) fn block_mask(&self, block: u64) -> BlockMask {
+        let number = self.blocks.find(block);
+        let block = number.and_then(|number| self.blocks.rows().get(number as usize));
+        block.map_or([0; 8], |block| block.leaf)
+    }
+
     /// Tests whether a cell has a voxel.
     #[inline]
     pub(crate) fn holds(&self, code: BlockKey) -> bool {

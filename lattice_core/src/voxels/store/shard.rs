@@ -2,6 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
+use super::block_mask::BlockMask;
 use super::cell_table::CellTable;
 pub(crate) use super::entry::{Entry, Life};
 use super::fixed_point::{Offsets, Point, most_points, offsets_of, points_of, voxel_of};
@@ -69,6 +70,11 @@ impl Shard {
     pub(crate) fn get(&self, code: BlockKey) -> Option<(u32, &Entry)> {
         let number = self.voxels.find(code)?;
         Some((number, self.voxels.rows().get(number as usize)?))
+    }
+
+    /// Occupied cells of a block.
+    pub(crate) fn block_mask(&self, block: u64) -> BlockMask {
+        self.voxels.block_mask(block)
     }
 
     /// Index of a cell, added as a voxel if there are fewer than `limit`.

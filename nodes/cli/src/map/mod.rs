@@ -28,7 +28,7 @@ pub enum Map {
     Diff(combine::Diff),
     /// Write the voxels with their centre in a box
     Crop(combine::Crop),
-    /// Find the nearest voxels, the clearance of a point, or the shortest path of a ball
+    /// Find the nearest voxels, the clearance of a point, or a short path of a ball
     Query(query::Query),
     /// Have a running mapper write its map
     Save(save::Save),

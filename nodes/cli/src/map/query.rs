@@ -29,7 +29,7 @@ pub struct Query {
     /// Compute the distance from a point to the nearest occupied polyhedral cell, 0 inside one
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, group = "question")]
     clearance: Option<Vec<f64>>,
-    /// Find the shortest path of a ball between two points along centres of free cells
+    /// Find a short path of a ball between two points, in free segments between centres of cells
     #[arg(
         long, num_args = 6, value_names = ["X", "Y", "Z", "X", "Y", "Z"], allow_negative_numbers = true,
         group = "question", requires = "radius",
@@ -116,7 +116,7 @@ impl Query {
             bounds: None,
             max_expanded: self.max_cells,
         };
-        let path = questions.shortest_path(&start, &goal, &options)?;
+        let path = questions.straight_path(&start, &goal, &options)?;
         Ok(Answer::Path(Way {
             length_m: path.length_m,
             expanded: path.expanded,

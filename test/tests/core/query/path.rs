@@ -167,6 +167,41 @@ proptest! {
     }
 
     #[test]
+    fn straight_paths_are_free_and_hardly_longer(
+        world in any_obstacles(),
+        radius_m in prop_oneof![Just(0.0), 0.0..0.5],
+        cells_per_radius in 1.0..9.0,
+    ) {
+        let mut world = world;
+        world.cell_volume_m3 = (radius_m.max(0.3) / cells_per_radius).powi(3);
+        let voxels = world.voxels();
+        let query = Query::new(&voxels);
+        let bounds = Some(around(&world));
+        let steps = Steps::Touching;
+        let options = PathOptions { radius_m, steps, bounds, max_expanded: 1_000_000 };
+        let start = world.datum_m + Vector3::new(-1.1, -1.0, -1.2);
+        let goal = world.datum_m + Vector3::new(1.1, 1.2, 1.0);
+        let straight = query.straight_path(&start, &goal, &options);
+        let shortest = query.shortest_path(&start, &goal, &options);
+        match (straight, shortest) {
+            (Ok(straight), Ok(shortest)) => {
+                check(&query, &straight, &options);
+                for (key, end) in [(straight.keys.first(), start), (straight.keys.last(), goal)] {
+                    prop_assert_eq!(key.copied(), voxels.key_of(&end));
+                }
+                let crow_m = (straight.centers_m[0] - straight.centers_m.last().unwrap()).norm();
+                prop_assert!(straight.length_m > crow_m - 1e-9);
+                // Long steps may go round another side of an obstacle, at most a metre across here.
+                prop_assert!(straight.length_m < 1.05 * shortest.length_m + 1.0);
+            }
+            (Err(straight), Err(shortest)) => {
+                prop_assert_eq!(std::mem::discriminant(&straight), std::mem::discriminant(&shortest));
+            }
+            (straight, shortest) => prop_assert!(false, "{:?} {:?}", straight, shortest),
+        }
+    }
+
+    #[test]
     fn larger_robots_and_fewer_steps_never_find_shorter_paths(world in any_obstacles()) {
         let voxels = world.voxels();
         let query = Query::new(&voxels);
