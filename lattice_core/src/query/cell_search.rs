@@ -97,7 +97,7 @@ impl<'a, S: VoxelStore> CellSearch<'a, S> {
                 .collect(),
             origin: [0; 3],
             weight: 1.0,
-            bound: StepLength::new(store.lattice(), corridor.steps.iter().map(|step| step.0)),
+            bound: corridor.bound(store.lattice()),
             unit_m,
             slots: FxHashMap::default(),
             blocks: Vec::new(),
@@ -164,7 +164,7 @@ impl<'a, S: VoxelStore> CellSearch<'a, S> {
             if at == goal {
                 return Ok(expanded);
             }
-            let Some((length, ways)) = self.expand(at) else {
+            let Some((length, wide)) = self.expand(at) else {
                 continue;
             };
             if expanded == self.max_expanded || !go_on() {
@@ -176,9 +176,6 @@ impl<'a, S: VoxelStore> CellSearch<'a, S> {
                 let Some(&(by, step)) = self.steps.get(number) else {
                     break;
                 };
-                if ways >> number & 1 == 0 {
-                    continue;
-                }
                 let Some(to) = self.neighbor(at.slot(), add(from, by)) else {
                     if self.is_full() {
                         return Err(PathError::Limit { expanded });
@@ -186,7 +183,8 @@ impl<'a, S: VoxelStore> CellSearch<'a, S> {
                     continue;
                 };
                 let length = length + step;
-                if self.reach(to, length, number as u8) {
+                if self.is_better(to, length) && (wide || self.is_step_free(at, number)) {
+                    self.reach(to, length, number as u8);
                     let rest = to_goal(self, self.place(to));
                     waiting.push(Reverse((total(length, rest), rest, to)));
                 }
@@ -214,8 +212,8 @@ impl<'a, S: VoxelStore> CellSearch<'a, S> {
         self.steps.get(usize::from(*number)).map(|step| step.0)
     }
 
-    /// Marks a node as expanded; returns its length and its free steps, one bit each, if it was not.
-    fn expand(&mut self, at: Node) -> Option<(u64, u32)> {
+    /// Marks a node as expanded; returns its length and whether no step from it is blocked, if it was not.
+    fn expand(&mut self, at: Node) -> Option<(u64, bool)> {
         let place = at.place();
         let block = self.blocks.get_mut(at.slot() as usize)?;
         if block_mask::is_set(&block.expanded, place) {
@@ -223,33 +221,38 @@ impl<'a, S: VoxelStore> CellSearch<'a, S> {
         }
         set(&mut block.expanded, place, true);
         let length = *block.lengths.get(place)?;
-        Some((length, block.free.free_steps(self.corridor, place)))
+        Some((length, block.free.is_wide(self.corridor, place)))
     }
 
-    /// Notes a way to an open node; false if one as short is known.
-    fn reach(&mut self, to: Node, length: u64, step: u8) -> bool {
+    fn is_step_free(&mut self, at: Node, number: usize) -> bool {
+        let block = self.blocks.get_mut(at.slot() as usize);
+        block.is_some_and(|block| {
+            let free = &mut block.free;
+            free.is_step_free(self.corridor, at.place(), number)
+        })
+    }
+
+    /// Tests whether a way to an open node is shorter than the known one. With a weight above 1 expanded nodes stay as
+    /// they are: the bound on the length holds (Likhachev, Gordon & Thrun 2003).
+    fn is_better(&self, to: Node, length: u64) -> bool {
+        self.block(to.slot()).is_some_and(|block| {
+            let known = block.lengths.get(to.place());
+            let settled = self.weight > 1.0 && block_mask::is_set(&block.expanded, to.place());
+            known.is_some_and(|known| length < *known) && !settled
+        })
+    }
+
+    /// Notes a way to an open node.
+    fn reach(&mut self, to: Node, length: u64, step: u8) {
         let Some(block) = self.blocks.get_mut(to.slot() as usize) else {
-            return false;
+            return;
         };
         let place = to.place();
-        let Some(known) = block
-            .lengths
-            .get_mut(place)
-            .filter(|known| length < **known)
-        else {
-            return false;
-        };
-        let expanded = block_mask::is_set(&block.expanded, place);
-        if expanded && self.weight > 1.0 {
-            // The bound on the length holds without another expansion (Likhachev, Gordon & Thrun 2003).
-            return false;
-        }
-        *known = length;
-        if let Some(last) = block.last.get_mut(place) {
-            *last = step;
+        if let (Some(known), Some(last)) = (block.lengths.get_mut(place), block.last.get_mut(place))
+        {
+            (*known, *last) = (length, step);
         }
         set(&mut block.expanded, place, false);
-        true
     }
 
     /// Node at a position relative to a block, if the ball fits there.

@@ -1,11 +1,14 @@
 //! Cells at which a ball fits, and steps on which it fits all the way.
 
+use rustc_hash::FxHashMap;
+
 use super::Segment;
 use super::clearance::cell_distance_m;
 use super::limits::MAX_ROBOT_CELLS;
 use super::path_error::PathError;
 use super::shells::{add, steps_within};
 use super::stencil::{Around, Stencil};
+use super::step_length::StepLength;
 use crate::lattice::{Lattice, LatticeIndex};
 use crate::voxels::VoxelStore;
 
@@ -40,32 +43,60 @@ impl Corridor {
             let (from_m, to_m) = (lattice.center([0; 3]), lattice.center(to));
             let line = Segment { from_m, to_m };
             let near = steps_within(lattice, reach_m + to_m.norm()).into_iter();
-            let distance_m = |w| cell_distance_m(&line, lattice.cell(), &lattice.center(w));
-            let near = near.map(|step| step.by);
-            near.filter(|&w| distance_m(w) <= blocked_m).collect()
+            let touches = |w: &LatticeIndex| {
+                let center_m = lattice.center(*w);
+                // Most cells are told by the radii between which their surface lies.
+                let beyond_m = line.distance_m(&center_m) - radius_m;
+                beyond_m < 0.999 * lattice.packing_radius_m()
+                    || beyond_m < 1.001 * covering_m
+                        && cell_distance_m(&line, lattice.cell(), &center_m) <= blocked_m
+            };
+            near.map(|step| step.by).filter(touches).collect()
         };
         let ball = touching([0; 3]);
-        let way = |&to: &LatticeIndex| -> Vec<LatticeIndex> {
+        // One direction decides for both, so that paths are reversible.
+        let mut forward = FxHashMap::default();
+        let mut way = |&step: &LatticeIndex| -> Vec<LatticeIndex> {
+            let to = step.map(|w| stride * w);
             let back = to.map(|w| -w);
-            if to > back {
-                return touching(to);
-            }
-            // One direction decides for both, so that paths are reversible.
-            let cells = touching(back).into_iter();
-            cells.map(|w| add(w, to)).collect()
+            let cells = forward
+                .entry(to.max(back))
+                .or_insert_with(|| touching(to.max(back)));
+            let by = if to > back { [0; 3] } else { to };
+            cells.iter().map(|w| add(*w, by)).collect()
         };
-        let cells = |step: &LatticeIndex| step.map(|w| stride * w);
-        let ways: Vec<_> = steps.iter().map(|step| way(&cells(step))).collect();
+        let ways: Vec<_> = steps.iter().map(&mut way).collect();
+        let length_m = |step: &LatticeIndex| f64::from(stride) * lattice.center(*step).norm();
         Ok(Corridor {
             all: Stencil::new(ways.iter().chain([&ball]).flatten().copied()),
             ball: Stencil::new(ball),
             ways: ways.into_iter().map(Stencil::new).collect(),
-            steps: steps
-                .iter()
-                .map(|step| (*step, lattice.center(cells(step)).norm()))
-                .collect(),
+            steps: steps.iter().map(|step| (*step, length_m(step))).collect(),
             stride,
         })
+    }
+
+    /// Steps to touching places, and each two of them one after the other where that is another direction: long steps
+    /// of 4 to 9 times as many directions.
+    pub(super) fn long_steps(lattice: &Lattice) -> Vec<LatticeIndex> {
+        let near = lattice.touching_neighbors();
+        let mut steps = near.to_vec();
+        for (&a, &b) in near.iter().flat_map(|a| near.iter().map(move |b| (a, b))) {
+            let to = add(a, b);
+            let primitive = to.iter().any(|w| w % 2 != 0);
+            if primitive && !steps.contains(&to) {
+                steps.push(to);
+            }
+        }
+        steps
+    }
+
+    /// Lower bound on the length of walks: the norm of the steps, or where these have most directions, the distance.
+    pub(super) fn bound(&self, lattice: &Lattice) -> StepLength {
+        if self.stride > 1 {
+            return StepLength::straight(lattice);
+        }
+        StepLength::new(lattice, self.steps.iter().map(|step| step.0))
     }
 
     /// Cells with centres within a distance of that of cell 0, nearest first.

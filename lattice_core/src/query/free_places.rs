@@ -69,30 +69,29 @@ impl FreePlaces {
         block_mask::is_set(&self.open, place)
     }
 
-    /// Steps from a place on which the ball fits, one bit each.
-    pub(super) fn free_steps(&mut self, corridor: &Corridor, place: usize) -> u32 {
-        let Some(around) = &self.around else {
-            return u32::MAX;
-        };
-        let ways = (0..).zip(&corridor.ways);
-        if corridor.stride > 1 {
-            if !self.meets(&corridor.all, corridor, place) {
-                return u32::MAX;
-            }
-            return ways.fold(0, |bits, (number, way)| {
-                bits | u32::from(!self.meets(way, corridor, place)) << number
-            });
+    /// Tests whether no step from a place is blocked.
+    pub(super) fn is_wide(&self, corridor: &Corridor, place: usize) -> bool {
+        match corridor.stride {
+            _ if self.around.is_none() => true,
+            1 => block_mask::is_set(&self.wide, place),
+            _ => !self.meets(&corridor.all, corridor, place),
         }
-        if block_mask::is_set(&self.wide, place) {
-            return u32::MAX;
+    }
+
+    /// Tests whether the ball fits on a step from a place, by the number of the step.
+    pub(super) fn is_step_free(&mut self, corridor: &Corridor, place: usize, step: usize) -> bool {
+        let Some(around) = &self.around else {
+            return true;
+        };
+        if corridor.stride > 1 {
+            let way = corridor.ways.get(step);
+            return way.is_some_and(|way| !self.meets(way, corridor, place));
         }
         if self.ways.is_empty() {
             self.ways = corridor.ways.iter().map(|way| free(way, around)).collect();
         }
-        let ways = (0..).zip(&self.ways);
-        ways.fold(0, |bits, (number, way)| {
-            bits | u32::from(block_mask::is_set(way, place)) << number
-        })
+        let way = self.ways.get(step);
+        way.is_some_and(|way| block_mask::is_set(way, place))
     }
 
     /// Memory of the tests, bytes.

@@ -21,8 +21,8 @@ pub enum Steps {
     Touching,
 }
 
-/// Weight of the bound to the goal of searches with long steps: it saves nine of ten expansions, and shortening takes
-/// back most of what it adds (`paths town` of the laboratory).
+/// Weight of the bound to the goal of searches with long steps. In the town of `paths` (laboratory), on six lattices,
+/// 1.05 gives lengths within 0.7 % of the shortest known, 1.1 within 2.8 % in two thirds of the time.
 const WEIGHT: f64 = 1.05;
 
 /// Options of a path search.
@@ -125,10 +125,11 @@ impl<S: VoxelStore> Query<'_, S> {
     ) -> Result<(Vec<LatticeIndex>, usize), PathError> {
         let lattice = self.store.lattice();
         let steps = match options.steps {
-            Steps::Face => lattice.face_neighbors(),
-            Steps::Touching => lattice.touching_neighbors(),
+            _ if stride > 1 => Corridor::long_steps(lattice),
+            Steps::Face => lattice.face_neighbors().to_vec(),
+            Steps::Touching => lattice.touching_neighbors().to_vec(),
         };
-        let corridor = Corridor::new(lattice, options.radius_m, steps, stride)?;
+        let corridor = Corridor::new(lattice, options.radius_m, &steps, stride)?;
         let bounds = options.bounds.map(|b| b.moved(&-self.store.datum_m()));
         let mut cells = CellSearch::new(self.store, &corridor, bounds, options.max_expanded);
         if stride > 1 {

@@ -10,11 +10,20 @@ use crate::lattice::{Lattice, LatticeIndex, corners};
 /// It is the maximum of `n . v` over the corners `n` of the polar polyhedron `n . s <= |s|`, which has one for each
 /// face of the hull.
 pub(super) struct StepLength {
-    /// Corners in the coordinates of indices; one of each pair of opposite ones.
+    generator: Matrix3<f64>,
+    /// Corners in the coordinates of indices; one of each pair of opposite ones. None for steps in any direction.
     corners: Vec<Vector3<f64>>,
 }
 
 impl StepLength {
+    /// Creates the norm of steps in any direction.
+    pub(super) fn straight(lattice: &Lattice) -> StepLength {
+        StepLength {
+            generator: lattice.generator(),
+            corners: Vec::new(),
+        }
+    }
+
     /// Creates the norm of steps that come in pairs of opposite ones.
     pub(super) fn new(
         lattice: &Lattice,
@@ -26,6 +35,7 @@ impl StepLength {
         let first = |n: &Vector3<f64>| (n.x, n.y, n.z) > (-n.x, -n.y, -n.z);
         let corners = corners(&directions).into_iter().filter(first);
         StepLength {
+            generator,
             corners: corners.map(|n| generator.transpose() * n).collect(),
         }
     }
@@ -34,6 +44,9 @@ impl StepLength {
     #[inline]
     pub(super) fn between_m(&self, from: LatticeIndex, to: LatticeIndex) -> f64 {
         let by = Vector3::from([0, 1, 2].map(|axis| f64::from(to[axis] - from[axis])));
+        if self.corners.is_empty() {
+            return (self.generator * by).norm();
+        }
         let along = self.corners.iter().map(|corner| corner.dot(&by).abs());
         along.fold(0.0, f64::max)
     }

@@ -13,9 +13,10 @@ const MAX_STRIDE: f64 = 8.0;
 impl<S: VoxelStore> Query<'_, S> {
     /// Finds a path of long free segments for a ball in a fraction of the time of [`Query::shortest_path`].
     ///
-    /// Steps of up to a radius are searched first, then steps of half the length, down to those of `shortest_path`,
-    /// until a path is found. Each place and each step is tested against all cells. The path is shortened: `keys` are
-    /// the cells of its corners. Long steps may miss a gap that is hardly wider than the ball, and find a longer way.
+    /// Steps of up to two radii in many directions are searched first, then steps of half the length, down to those
+    /// of `shortest_path`, until a path is found. Each place and each step is tested against all cells. The path is
+    /// shortened: `keys` are the cells of its corners. Long steps may miss a gap that is hardly wider than the ball,
+    /// and find a longer way.
     pub fn straight_path(
         &self,
         start_m: &Vector3<f64>,

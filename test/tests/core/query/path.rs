@@ -170,10 +170,10 @@ proptest! {
     fn straight_paths_are_free_and_hardly_longer(
         world in any_obstacles(),
         radius_m in prop_oneof![Just(0.0), 0.0..0.5],
-        cells_per_radius in 1.0..9.0,
+        cells_per_radius in 1.0..9.0_f64,
     ) {
         let mut world = world;
-        world.cell_volume_m3 = (radius_m.max(0.3) / cells_per_radius).powi(3);
+        world.cell_volume_m3 = (f64::max(radius_m, 0.3) / cells_per_radius).powi(3);
         let voxels = world.voxels();
         let query = Query::new(&voxels);
         let bounds = Some(around(&world));
