@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{MergedLabels, MergerOptions};
+use super::options::{MergedLabels, MergerOptions};
 use crate::compute::ComputeLimits;
 use crate::{options, report};
 use lattice_runtime::about;
