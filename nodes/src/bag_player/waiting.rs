@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 
 use lattice_runtime::Node;
 
+use super::commands::SLICE;
 use super::lockstep::Lockstep;
-use super::playback::{Playback, SLICE};
+use super::playback::Playback;
 use crate::start::{LAST_FLUSH, NodeError};
 
 /// Flush timeout at the end.

@@ -14,6 +14,7 @@ mod path;
 
 pub use counts::{OdometryCounts, OdometryReport};
 pub use loops::DriveLoops;
+#[cfg(feature = "bags")]
 pub(crate) use machine::PAUSE_NS;
 pub use machine::{LidarOdometry, Registered, odometry_message};
 pub use options::LidarOdometryOptions;
