@@ -5,9 +5,9 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use super::backends::read_network_by;
 use super::network::{Backend, ModelError, Network, Size};
-use super::options::input_size;
-use super::{SegmenterOptions, read_network_by};
+use super::options::{SegmenterOptions, input_size};
 use crate::compute::ComputeLimits;
 use crate::{options, report};
 use lattice_runtime::params::{About, ParamError, Params};
