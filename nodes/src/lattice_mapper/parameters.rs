@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use super::autosave::AutosaveOptions;
+use super::free_options::FreeSpaceMethod;
 use super::map_folder::MapFolder;
-use super::{FreeSpaceMethod, MapperOptions};
+use super::options::MapperOptions;
 use crate::compute::ComputeLimits;
 use crate::{options, report};
 use lattice_runtime::about;
