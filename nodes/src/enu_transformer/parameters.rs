@@ -1,7 +1,7 @@
 //! Parameters of the transformer.
 
-use super::TransformerOptions;
-use super::ins::InsSource;
+use super::ins_options::InsSource;
+use super::options::TransformerOptions;
 use crate::compute::ComputeLimits;
 use crate::options::{self, FRAME, TOPIC};
 use crate::report;

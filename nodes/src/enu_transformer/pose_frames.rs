@@ -7,29 +7,12 @@ use lattice_core::geodesy::InsMount;
 use lattice_core::pose::{StampedPose, TfMiss};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use super::ins::{Body, BodyPose};
-use super::{EnuOutput, EnuTransformer};
+use super::body_pose::{Body, BodyPose};
+use super::reference::{Reference, WaitingPose};
+use super::state::{EnuOutput, EnuTransformer};
 
 /// Limit of poses that wait for transforms.
 const MAX_WAITING_POSES: usize = 4096;
-
-/// Pose that waits for its transforms.
-pub(super) struct WaitingPose {
-    topic: Arc<str>,
-    pose: BodyPose,
-    arrived_ns: i64,
-}
-
-/// Relation of the poses' reference frame to the map frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Reference {
-    /// Undecided.
-    Unknown,
-    /// Connected with the map frame by transforms.
-    OnTf,
-    /// Not connected with the map frame, so it is used as the map frame.
-    IsMap,
-}
 
 /// A missing transform of a pose.
 struct Missing {

@@ -6,9 +6,10 @@ use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::tf2_msgs::TFMessage;
 use nalgebra::Isometry3;
 
-use super::ins::{InsRefusal, InsSource};
+use super::ins_options::InsSource;
+use super::ins_refusal::InsRefusal;
 use super::stamp_order::Refused;
-use super::{EnuOutput, EnuTransformer};
+use super::state::{EnuOutput, EnuTransformer};
 use crate::convert::geometry;
 
 impl EnuTransformer {
