@@ -1,8 +1,8 @@
 //! Parameters of the viewer.
 
 use super::bridge::{BridgeOptions, HeadsetLimits};
-use super::offer::MAX_MESSAGE_BYTES;
 use super::options::ViewerOptions;
+use super::session::MAX_MESSAGE_BYTES;
 use crate::compute::ComputeLimits;
 use crate::options::{self, TOPIC};
 use crate::report;

@@ -8,7 +8,7 @@ use super::root;
 use super::source::{code, files, module};
 
 /// Modules of crates and of folders in layers: each may use those before it in the list.
-const LAYERS: [(&str, &str); 8] = [
+const LAYERS: [(&str, &str); 26] = [
     (
         "lattice_core/src",
         "prefetch lattice kd_tree cloud geodesy pose voxels query raycast navigation registration odometry loop_closure",
@@ -17,6 +17,78 @@ const LAYERS: [(&str, &str); 8] = [
         "nodes/src",
         "hurry octree files convert mesh stamps start report compute options cloud_input map_follower map_input map_output camera segmenter semantic_cloud headset_cloud enu_transformer lidar_odometry lattice_mapper map_merger map_projector \
          voxel_marker_publisher semantic_icp_server viewer_server replay running executables bag_player bag_recorder",
+    ),
+    (
+        "nodes/src/bag_player",
+        "commands parameters player_report playhead steps lockstep playback controls keyboard waiting",
+    ),
+    (
+        "nodes/src/bag_recorder",
+        "cache choice definitions offered session controls writing",
+    ),
+    (
+        "nodes/src/camera",
+        "camera_error distortion image palette labels pinhole point_layout soft pixels points",
+    ),
+    (
+        "nodes/src/cloud_input",
+        "error records channels livox scan cloud_type subscription",
+    ),
+    (
+        "nodes/src/enu_transformer",
+        "body_pose cloud_clocks cloud_notes cloud_times ins_options options attitude parameters reference refusals counts samples speed_gate stamp_order ins_refusal fixes ins link_orders waiting state drops placing pose_frames pose_intake sampling transforms verdict machine node",
+    ),
+    (
+        "nodes/src/files/points",
+        "format error collect label scalar bin_layout source e57 kitti las octree detect text pcd ply",
+    ),
+    (
+        "nodes/src/headset_cloud",
+        "counts marker refusal session chunks surfaces view options parameters poses waiting machine meshes node",
+    ),
+    (
+        "nodes/src/lattice_mapper",
+        "counts free_options free_space map_folder occupancy options outputs refusal state autosave corrected datum machine map_messages octree operations parameters plan call octomap report services unmapped compute_state status node",
+    ),
+    (
+        "nodes/src/lidar_odometry",
+        "counts motions options machine live_loops loops parameters path node",
+    ),
+    (
+        "nodes/src/map_follower",
+        "followed followed_map incomplete follower keyframe",
+    ),
+    (
+        "nodes/src/map_merger",
+        "options parameters robot_map machine node",
+    ),
+    (
+        "nodes/src/map_projector",
+        "changes messages options parameters robot window machine node",
+    ),
+    (
+        "nodes/src/replay",
+        "camera_input camera_report packets topics disorder slice survey images cameras topic_plan depth_clouds poses scan_poses report pipeline mount_samples statics plan",
+    ),
+    (
+        "nodes/src/segmenter",
+        "checks counts jpeg network colors compressed labels options machine regular_file names file sizes onnx_runtime tract backends parameters worker inside node",
+    ),
+    (
+        "nodes/src/semantic_cloud",
+        "compressed counts network project waiting options machine parameters node",
+    ),
+    (
+        "nodes/src/semantic_icp_server",
+        "counts headset_scans options outputs parameters search output search_thread state diagnosis jobs intake machine map results node",
+    ),
+    (
+        "nodes/src/viewer_server",
+        "protocol http options session broadcast bridge map_source parameters server fixed sources node hostile_tests pause_tests",
+    ),
+    (
+        "nodes/src/voxel_marker_publisher",
+        "blocks color options packer parameters shape machine node",
     ),
     (
         "nodes/runtime/src",
