@@ -13,7 +13,7 @@ use lattice_runtime::logging::Throttle;
 use lattice_runtime::params::{ParamValue, Params};
 use lattice_runtime::{Diagnostics, Level, Publisher, RawPublisher, Shutdown};
 
-use super::commands::Commands;
+use super::commands::{Commands, SLICE};
 use super::lockstep::Lockstep;
 use super::player_report::PlayerReport;
 use super::playhead::Playhead;
@@ -285,6 +285,23 @@ impl Playback {
         let publish = |clock: &Publisher<Clock>| clock.publish(message);
         if let Some(Err(error)) = self.clock.as_ref().map(publish) {
             log::debug!("/clock: {error}");
+        }
+    }
+
+    /// Waits until a topic has room for a message; once per subscriber that does not acknowledge.
+    fn wait_for_room(&mut self, topic: usize, bytes: usize) {
+        if self.stuck.get(topic).is_none_or(|stuck| *stuck) {
+            return;
+        }
+        let begin = Instant::now();
+        while let Some(publisher) = self.topics.get(topic) {
+            let left = self.most_wait.saturating_sub(begin.elapsed());
+            if publisher.has_room_within(bytes, left.min(SLICE)) || left.is_zero() {
+                return;
+            }
+            if !self.obey() {
+                return;
+            }
         }
     }
 

@@ -60,23 +60,6 @@ impl Playback {
         Ok(())
     }
 
-    /// Waits until a topic has room for a message; once per subscriber that does not acknowledge.
-    pub(super) fn wait_for_room(&mut self, topic: usize, bytes: usize) {
-        if self.stuck.get(topic).is_none_or(|stuck| *stuck) {
-            return;
-        }
-        let begin = Instant::now();
-        while let Some(publisher) = self.topics.get(topic) {
-            let left = self.most_wait.saturating_sub(begin.elapsed());
-            if publisher.has_room_within(bytes, left.min(SLICE)) || left.is_zero() {
-                return;
-            }
-            if !self.obey() {
-                return;
-            }
-        }
-    }
-
     /// Waits for acknowledgements at the end.
     pub(super) fn flush(&mut self) {
         self.ended = true;

@@ -3,6 +3,7 @@
 //! [`EnuTransformer`] is a state machine without I/O; [`node`] runs it behind DDS.
 
 mod attitude;
+mod body_mounts;
 mod body_pose;
 mod cloud_clocks;
 mod cloud_notes;
@@ -30,6 +31,7 @@ mod sampling;
 mod speed_gate;
 mod stamp_order;
 mod state;
+mod tf_intake;
 mod transforms;
 mod verdict;
 mod waiting;

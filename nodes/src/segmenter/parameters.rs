@@ -17,7 +17,6 @@ const MODEL: &str = "the network is made at the start";
 const ABOUT: &[About] = about! {
     "model" fixed(MODEL): "Network, an ONNX file: one image in (1 x 3 x rows x columns), scores of classes or classes out.";
     "compressed" fixed(options::TOPIC): "Whether images are taken from rgb/image_rect_color/compressed (JPEG).";
-    "max_image_pixels": "Limit of pixels per image; larger images are rejected.";
 };
 
 /// Parameters of a network, in any node.
