@@ -36,7 +36,8 @@ const LAYERS: [(&str, &str); 26] = [
     ),
     (
         "nodes/src/enu_transformer",
-        "body_pose cloud_clocks cloud_notes cloud_times ins_options options attitude parameters reference refusals counts samples speed_gate stamp_order ins_refusal fixes ins link_orders waiting state drops placing pose_frames pose_intake sampling transforms verdict machine node",
+        "cloud_clocks cloud_notes cloud_times ins_options options parameters attitude refusals counts body_pose reference samples speed_gate stamp_order ins_refusal fixes ins link_orders waiting \
+         state transforms body_mounts drops verdict sampling placing pose_intake pose_frames machine tf_intake node",
     ),
     (
         "nodes/src/files/points",
@@ -48,7 +49,8 @@ const LAYERS: [(&str, &str); 26] = [
     ),
     (
         "nodes/src/lattice_mapper",
-        "counts free_options free_space map_folder occupancy options outputs refusal state autosave corrected datum machine map_messages octree operations parameters plan call octomap report services unmapped compute_state status node",
+        "counts free_options options free_space occupancy map_folder outputs refusal state datum machine map_messages octree operations corrected report \
+         plan call octomap services autosave parameters unmapped compute_state status node",
     ),
     (
         "nodes/src/lidar_odometry",
@@ -68,7 +70,7 @@ const LAYERS: [(&str, &str); 26] = [
     ),
     (
         "nodes/src/replay",
-        "camera_input camera_report packets topics disorder slice survey images cameras topic_plan depth_clouds poses scan_poses report pipeline mount_samples statics plan",
+        "packets camera_input topics disorder slice survey images cameras topic_plan poses statics plan camera_report depth_clouds scan_poses report pipeline mount_samples",
     ),
     (
         "nodes/src/segmenter",
@@ -80,11 +82,11 @@ const LAYERS: [(&str, &str); 26] = [
     ),
     (
         "nodes/src/semantic_icp_server",
-        "counts headset_scans options outputs parameters search output search_thread state diagnosis jobs intake machine map results node",
+        "counts headset_scans options parameters search output state jobs map intake results machine diagnosis outputs search_thread node",
     ),
     (
         "nodes/src/viewer_server",
-        "protocol http options session broadcast bridge map_source parameters server fixed sources node hostile_tests pause_tests",
+        "protocol session broadcast bridge http server options parameters map_source fixed sources node hostile_tests pause_tests",
     ),
     (
         "nodes/src/voxel_marker_publisher",
