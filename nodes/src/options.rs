@@ -6,6 +6,8 @@ use lattice_runtime::about;
 use lattice_runtime::params::{About, ParamError, Params};
 use nalgebra::Vector3;
 
+use crate::compute::ComputeLimits;
+
 /// Common parameters of several nodes.
 pub const COMMON: &[About] = about! {
     "map_frame" fixed(FRAME): "Frame of the map (x east, y north, z up where it comes from an INS).";
@@ -14,6 +16,15 @@ pub const COMMON: &[About] = about! {
     "inbox_bytes" fixed(INBOX): "Limit of message bytes queued for the compute thread.";
     "report_file" fixed("it names an output"): "File for a report in JSON at the end; empty: none.";
     "mapper" fixed("it names a topic"): "Node that receives keyframe requests after a loss of map messages.";
+    "max_cloud_points": "Limit of points per cloud; larger clouds are rejected.";
+    "max_voxels": "Voxel limit of the followed map.";
+    "max_image_pixels": "Limit of pixels per image; larger images are rejected.";
+    "rectified": "Whether the images are rectified: p of camera_info is used, otherwise k and the distortion.";
+    "stride": "Step between the rows and columns that become points.";
+    "min_range_m": "Points nearer to the sensor are rejected.";
+    "max_range_m": "Points farther from the sensor are rejected; 0: no limit.";
+    "update_period_s": "Period of voxel_map_updates.";
+    "group_labels": "Groups of classes: class, group, class, group and so on.";
     "label_low_16_bits": "Whether only the low 16 bits of 32-bit labels are the class (SemanticKITTI: the high bits are the instance).";
     "ignored_labels": "Classes treated as unlabelled, such as 0 in SemanticKITTI.";
     "palette_rgb_class": "Classes of colours, for clouds labelled by the colours semantic_color, semantic_color1 to 3 or rgb, and for colour masks: red, green, blue, class, and so on.";
@@ -54,9 +65,18 @@ pub fn inbox_events(params: &Params, default: usize) -> Result<usize, ParamError
     params.usize_in("inbox_events", default, 1..=MAX_EVENTS)
 }
 
-/// `inbox_bytes`: limit of queued bytes of a node.
-pub fn inbox_bytes(params: &Params, default: usize) -> Result<usize, ParamError> {
-    params.positive("inbox_bytes", default)
+/// Limits of a compute thread, with the defaults of `inbox_events` and `inbox_bytes`.
+pub fn compute_limits(
+    params: &Params,
+    events: usize,
+    bytes: usize,
+    threads: usize,
+) -> Result<ComputeLimits, ParamError> {
+    Ok(ComputeLimits {
+        events: inbox_events(params, events)?,
+        bytes: params.positive("inbox_bytes", bytes)?,
+        threads,
+    })
 }
 
 /// `threads`: threads of a pool; 0: one less than the number of cores.
@@ -101,13 +121,12 @@ mod tests {
         let mapper: Read = |params| MapperOptions::from_params(params).map(drop);
         let markers: Read = |params| MarkerOptions::from_params(params).map(drop);
         let server: Read = |params| ServerOptions::from_params(params).map(drop);
-        let events: Read = |params| inbox_events(params, 4096).map(drop);
-        let bytes: Read = |params| inbox_bytes(params, 4096).map(drop);
+        let limits: Read = |params| compute_limits(params, 4096, 4096, 1).map(drop);
         let threads: Read = |params| threads(params, 0).map(drop);
         for (read, name, value, expected) in [
-            (events, "inbox_events", "0", "1 to 262144"),
-            (events, "inbox_events", "1000000000000", "1 to 262144"),
-            (bytes, "inbox_bytes", "0", "1 or more"),
+            (limits, "inbox_events", "0", "1 to 262144"),
+            (limits, "inbox_events", "1000000000000", "1 to 262144"),
+            (limits, "inbox_bytes", "0", "1 or more"),
             (threads, "threads", "100000", "0 to 256"),
             (transformer, "min_range_m", "60.0", "at most `max_range_m`"),
             (transformer, "min_range_m", "-1.0", "0.0 or more"),

@@ -7,7 +7,7 @@ use std::thread;
 use rustix::process::getpgrp;
 use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcgetpgrp, tcsetattr};
 
-use super::controls::Control;
+use super::commands::Command;
 use super::playback::Playback;
 use super::steps::Steps;
 
@@ -19,7 +19,7 @@ pub(super) struct Keyboard(Termios);
 
 impl Keyboard {
     /// Reads keys if the process has the terminal in the foreground; `None` otherwise.
-    pub(super) fn start(controls: Sender<Control>) -> Option<Self> {
+    pub(super) fn start(controls: Sender<Command<Playback>>) -> Option<Self> {
         if !stdin().is_terminal() || !is_foreground() {
             return None;
         }
@@ -49,7 +49,7 @@ fn is_foreground() -> bool {
     tcgetpgrp(stdin()).is_ok_and(|foreground| foreground == getpgrp())
 }
 
-fn read_keys(controls: &Sender<Control>) {
+fn read_keys(controls: &Sender<Command<Playback>>) {
     let mut keys = Keys::default();
     for byte in stdin().lock().bytes().map_while(Result::ok) {
         if let Some(press) = keys.press(byte)

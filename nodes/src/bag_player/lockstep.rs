@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use lattice_runtime::qos::{Durability, Qos, Reliability};
 use lattice_runtime::{Node, RemotePublisher, Subscription, SubscriptionExecutor};
 
-use super::playback::SLICE;
+use super::commands::SLICE;
 use crate::start::NodeError;
 
 /// Queue depth of reply subscriptions.

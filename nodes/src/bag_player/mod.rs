@@ -1,10 +1,12 @@
 //! `bag_player`: publishes a rosbag2 log on its recorded topics.
 
+mod commands;
 mod controls;
 mod keyboard;
 mod lockstep;
 mod parameters;
 mod playback;
+mod player_report;
 mod playhead;
 mod steps;
 mod waiting;
@@ -13,12 +15,11 @@ use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use serde::Serialize;
-
 use crate::executables::{Files, answers_help, start_runtime};
 use crate::report;
 use crate::start::{Declare, NodeError, check_topics, open_params};
-use controls::Controls;
+use commands::Commands;
+use controls::serve_controls;
 use keyboard::Keyboard;
 use lattice_bag::{BagQos, BagReader, Player, STATIC_DEPTH, TopicInfo};
 use lattice_runtime::logging::Throttle;
@@ -31,6 +32,7 @@ use playback::{Playback, STATE_PERIOD};
 use playhead::Playhead;
 
 pub use parameters::declare;
+pub use player_report::PlayerReport;
 
 /// Default name of the node, and name of the executable.
 pub const NAME: &str = "bag_player";
@@ -40,21 +42,6 @@ pub const NAME: &str = "bag_player";
 const MAX_DEPTH: u64 = 10_000;
 /// Limit of messages kept in memory for late joiners: the depth of `/rosout`, the largest in ROS.
 const MAX_KEPT: u64 = 1000;
-
-/// Result of a playback.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct PlayerReport {
-    /// Messages passed to the publishers.
-    pub messages: u64,
-    /// Messages skipped because a subscriber had not acknowledged earlier ones.
-    pub failed: u64,
-    /// Messages not acknowledged by reliable subscribers, at the end or when they left.
-    pub unacknowledged: u64,
-    /// Largest delay of a message, ms.
-    pub latest_ms: u64,
-    /// True if all reliable readers acknowledged all messages in time.
-    pub acknowledged: bool,
-}
 
 /// Plays the log given by the parameters and returns at its end or after a signal.
 pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError> {
@@ -86,9 +73,11 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     let span_ns = (reader.start_ns().unwrap_or(0), reader.end_ns().unwrap_or(0));
     let has_clock = player.clock_hz.is_some();
     let player = Player::new(reader, player)?;
-    let controls = Rc::new(Controls::serve(&node)?);
+    let commands = Rc::new(Commands::new());
+    // Kept to the end: the last replies need them.
+    let _servers = serve_controls(&node, &commands.sender())?;
     let mut playback = Playback {
-        controls: Rc::clone(&controls),
+        commands: Rc::clone(&commands),
         steps: None,
         ended: false,
         topics: open_topics(&node, &player)?,
@@ -111,10 +100,10 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     };
     check_topics(params, |_| false)?;
     let _keyboard = match keyboard {
-        true => Keyboard::start(controls.sender()),
+        true => Keyboard::start(commands.sender()),
         false => None,
     };
-    let changes = controls.sender();
+    let changes = commands.sender();
     let now = Arc::clone(params);
     open_params(params, move |params| {
         let read = |params| Settings::from_params(params).map_err(|error| error.to_string());
@@ -144,25 +133,12 @@ pub fn run(arguments: impl IntoIterator<Item = String>) -> Result<(), NodeError>
     let result = playback.play();
     playback.flush();
     report::write(&report_file, &playback.report, &node.diagnostics())?;
-    // Sends the last replies, which need the servers.
+    // Sends the last replies.
     drop(runtime);
-    drop(controls);
     result?;
     match playback.report.losses() {
         Some(losses) if strict => Err(format!("{losses} (`strict`)").into()),
         _ => Ok(()),
-    }
-}
-
-impl PlayerReport {
-    /// Summary of undelivered messages, if any.
-    fn losses(&self) -> Option<String> {
-        let (failed, unacknowledged) = (self.failed, self.unacknowledged);
-        (failed > 0 || unacknowledged > 0).then(|| {
-            format!(
-                "{failed} skipped for subscribers that do not acknowledge, {unacknowledged} not acknowledged"
-            )
-        })
     }
 }
 

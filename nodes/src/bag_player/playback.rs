@@ -13,9 +13,9 @@ use lattice_runtime::logging::Throttle;
 use lattice_runtime::params::{ParamValue, Params};
 use lattice_runtime::{Diagnostics, Level, Publisher, RawPublisher, Shutdown};
 
-use super::PlayerReport;
-use super::controls::Controls;
+use super::commands::{Commands, SLICE};
 use super::lockstep::Lockstep;
+use super::player_report::PlayerReport;
 use super::playhead::Playhead;
 use super::steps::Steps;
 use crate::start::NodeError;
@@ -27,9 +27,6 @@ const MOST_LATE: Duration = Duration::from_secs(1);
 pub(super) const STATE_PERIOD: Duration = Duration::from_millis(500);
 /// Longest sleep between checks of the shutdown flag, and period of `/clock` while paused.
 pub(super) const NAP: Duration = Duration::from_millis(100);
-
-/// Longest wait between command checks: a call is replied to within 100 ms.
-pub(super) const SLICE: Duration = Duration::from_millis(20);
 
 /// Part of a delay that shifts the time base.
 fn not_made_up(late: Duration) -> Duration {
@@ -43,7 +40,7 @@ fn not_made_up(late: Duration) -> Duration {
 /// Playback of a log.
 pub(super) struct Playback {
     pub player: Player,
-    pub controls: Rc<Controls>,
+    pub commands: Rc<Commands<Self>>,
     /// Messages requested by a call while paused.
     pub steps: Option<Steps>,
     /// First and last time of the log.
@@ -88,7 +85,7 @@ impl Playback {
                 (true, false) => NAP,
                 (false, _) => left.min(NAP),
             };
-            if let Some(control) = self.controls.next(patience) {
+            if let Some(control) = self.commands.next(patience) {
                 control(self);
                 self.diagnose();
                 continue;
@@ -118,8 +115,8 @@ impl Playback {
 
     /// Executes pending commands; false once the playback is to end.
     pub(super) fn obey(&mut self) -> bool {
-        let controls = Rc::clone(&self.controls);
-        while let Some(control) = controls.next(Duration::ZERO) {
+        let commands = Rc::clone(&self.commands);
+        while let Some(control) = commands.next(Duration::ZERO) {
             control(self);
         }
         !self.shutdown.is_requested() && !self.stopped
@@ -288,6 +285,23 @@ impl Playback {
         let publish = |clock: &Publisher<Clock>| clock.publish(message);
         if let Some(Err(error)) = self.clock.as_ref().map(publish) {
             log::debug!("/clock: {error}");
+        }
+    }
+
+    /// Waits until a topic has room for a message; once per subscriber that does not acknowledge.
+    fn wait_for_room(&mut self, topic: usize, bytes: usize) {
+        if self.stuck.get(topic).is_none_or(|stuck| *stuck) {
+            return;
+        }
+        let begin = Instant::now();
+        while let Some(publisher) = self.topics.get(topic) {
+            let left = self.most_wait.saturating_sub(begin.elapsed());
+            if publisher.has_room_within(bytes, left.min(SLICE)) || left.is_zero() {
+                return;
+            }
+            if !self.obey() {
+                return;
+            }
         }
     }
 

@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 
 use lattice_runtime::Node;
 
+use super::commands::SLICE;
 use super::lockstep::Lockstep;
-use super::playback::{Playback, SLICE};
+use super::playback::Playback;
 use crate::start::{LAST_FLUSH, NodeError};
 
 /// Flush timeout at the end.
@@ -57,23 +58,6 @@ impl Playback {
         let played: Vec<String> = topics.map(|topic| topic.info.name.clone()).collect();
         self.lockstep = Lockstep::start(pairs, &played, node, timeout, &mut || self.obey())?;
         Ok(())
-    }
-
-    /// Waits until a topic has room for a message; once per subscriber that does not acknowledge.
-    pub(super) fn wait_for_room(&mut self, topic: usize, bytes: usize) {
-        if self.stuck.get(topic).is_none_or(|stuck| *stuck) {
-            return;
-        }
-        let begin = Instant::now();
-        while let Some(publisher) = self.topics.get(topic) {
-            let left = self.most_wait.saturating_sub(begin.elapsed());
-            if publisher.has_room_within(bytes, left.min(SLICE)) || left.is_zero() {
-                return;
-            }
-            if !self.obey() {
-                return;
-            }
-        }
     }
 
     /// Waits for acknowledgements at the end.

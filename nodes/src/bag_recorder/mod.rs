@@ -27,6 +27,7 @@ use session::Session;
 use writing::Written;
 
 pub use choice::Choice;
+pub use session::RecordedTopic;
 
 /// Default name of the node.
 pub const NAME: &str = "bag_recorder";
@@ -59,21 +60,6 @@ pub struct RecorderOptions {
     pub polling: Duration,
     /// True: nothing is recorded before `~/resume`.
     pub start_paused: bool,
-}
-
-/// Statistics of a recorded topic.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct RecordedTopic {
-    /// Full name.
-    pub name: String,
-    /// Type.
-    pub type_name: String,
-    /// Received messages.
-    pub heard: u64,
-    /// Messages lost before reception, or too long.
-    pub lost: u64,
-    /// Messages dropped at the cache, or not representable in a bag.
-    pub not_written: u64,
 }
 
 /// Result of a recording.

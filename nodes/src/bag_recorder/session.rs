@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use lattice_bag::TopicSpec;
 use lattice_runtime::qos::Durability;
 use lattice_runtime::{Node, RemotePublisher, RuntimeError, Subscription, SubscriptionExecutor};
+use serde::Serialize;
 
-use super::RecordedTopic;
 use super::cache::{Cache, Item};
 use super::choice::Choice;
 use super::definitions::Definitions;
@@ -26,6 +26,21 @@ const LARGE: [&str; 3] = [
     "sensor_msgs/msg/Image",
     "sensor_msgs/msg/CompressedImage",
 ];
+
+/// Statistics of a recorded topic.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct RecordedTopic {
+    /// Full name.
+    pub name: String,
+    /// Type.
+    pub type_name: String,
+    /// Received messages.
+    pub heard: u64,
+    /// Messages lost before reception, or too long.
+    pub lost: u64,
+    /// Messages dropped at the cache, or not representable in a bag.
+    pub not_written: u64,
+}
 
 /// Recorded topics in the order of their discovery.
 pub(super) struct Session {

@@ -1,6 +1,6 @@
 //! Lens distortion models of OpenCV and ROS, and their inverse.
 
-use super::pinhole::CameraError;
+use super::camera_error::CameraError;
 
 /// Iteration limit of the inverse; a ray that does not converge is outside the model.
 const MAX_STEPS: usize = 50;

@@ -7,7 +7,7 @@ use lattice_msgs::sensor_msgs::Image;
 
 use super::image::{Content, ImageView};
 use super::labels::{Classes, Sampled, nearest};
-use super::points::PointLayout;
+use super::point_layout::PointLayout;
 use super::soft::{SHARES, Share, SoftLabels};
 
 /// Labels of one stamp with their companion images; each of any size.

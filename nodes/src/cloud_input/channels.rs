@@ -2,8 +2,8 @@
 
 use lattice_msgs::sensor_msgs::{PointCloud, PointCloud2, PointField};
 
+use super::error::{CloudInputError, check_count};
 use super::records::Records;
-use super::{CloudInputError, check_count};
 
 /// Limit of a channel's name in an error.
 const SHOWN_CHARS: usize = 48;

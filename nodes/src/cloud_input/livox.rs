@@ -3,8 +3,8 @@
 use lattice_msgs::livox_ros_driver2::CustomMsg;
 use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 
+use super::error::{CloudInputError, check_count};
 use super::records::{Records, TIME_FIELD};
-use super::{CloudInputError, check_count};
 
 /// Cloud of a message, with the fields x, y, z, `intensity` (the reflectivity), `tag`, `line` and [`TIME_FIELD`].
 ///

@@ -7,8 +7,8 @@ use lattice_msgs::sensor_msgs::{
 };
 use lattice_msgs::std_msgs::Header;
 
+use super::error::{CloudInputError, check_count};
 use super::records::{Records, TIME_FIELD};
-use super::{CloudInputError, check_count};
 
 /// Field of the intensities.
 const INTENSITY: &str = "intensity";

@@ -14,9 +14,11 @@ use lattice_runtime::{
     Timer, lock,
 };
 
-use super::{
-    CloudInputError, CloudType, cloud_of_channels, cloud_of_echoes, cloud_of_livox, cloud_of_scan,
-};
+use super::channels::cloud_of_channels;
+use super::cloud_type::CloudType;
+use super::error::CloudInputError;
+use super::livox::cloud_of_livox;
+use super::scan::{cloud_of_echoes, cloud_of_scan};
 use crate::convert::cloud;
 use crate::start::NodeError;
 

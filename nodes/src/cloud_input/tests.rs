@@ -1,8 +1,12 @@
-use lattice_core::cloud::{CloudLimits, NO_TIME_NS};
+use lattice_core::cloud::{CloudLimits, NO_TIME_NS, TimeOptions, TimeReference, TimeUnit};
 use lattice_msgs::builtin_interfaces::Time;
 use lattice_msgs::geometry_msgs::Point32;
 use lattice_msgs::livox_ros_driver2::{CustomMsg, CustomPoint};
-use lattice_msgs::sensor_msgs::{ChannelFloat32, LaserEcho};
+use lattice_msgs::sensor_msgs::{
+    ChannelFloat32, LaserEcho, LaserScan, MultiEchoLaserScan, PointCloud, PointCloud2,
+};
+use lattice_msgs::std_msgs::Header;
+use lattice_msgs::{cdr, livox_interfaces};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 

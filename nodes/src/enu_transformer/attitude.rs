@@ -3,7 +3,8 @@
 use lattice_core::pose::{AttitudeCheck, AttitudeFinding, StampedPose};
 use serde::{Deserialize, Serialize};
 
-use super::{EnuTransformer, InsSource, TransformerOptions};
+use super::ins_options::InsSource;
+use super::options::TransformerOptions;
 
 /// Attitudes that contradict the way of the machine.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -82,19 +83,12 @@ impl Attitudes {
         }
     }
 
-    fn report(&self, options: &TransformerOptions) -> Option<AttitudeReport> {
+    pub(super) fn report(&self, options: &TransformerOptions) -> Option<AttitudeReport> {
         let is_geodetic = matches!(
             options.ins.source,
             InsSource::NavsatfixImu | InsSource::Inspva | InsSource::Inspvax
         );
         AttitudeReport::of(&self.check.finding()?, &options.base_frame, is_geodetic)
-    }
-}
-
-impl EnuTransformer {
-    /// Contradiction between the attitudes of all poses so far and the way of the machine.
-    pub fn attitude(&self) -> Option<AttitudeReport> {
-        self.attitudes.report(&self.options)
     }
 }
 

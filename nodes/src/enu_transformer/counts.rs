@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{AttitudeReport, CloudNote, Refusal, most_frequent};
+use super::attitude::AttitudeReport;
+use super::cloud_notes::CloudNote;
+use super::refusals::{Refusal, most_frequent};
 
 /// Counters of one transformer. Every cloud ends in exactly one of the `clouds_` counters
 /// other than `clouds_in`, or is still queued.

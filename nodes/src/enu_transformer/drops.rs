@@ -3,8 +3,8 @@
 use lattice_core::cloud::CloudError;
 use lattice_core::pose::{PoseMiss, TfMiss};
 
-use super::EnuTransformer;
-use super::ins::InsSource;
+use super::ins_options::InsSource;
+use super::state::EnuTransformer;
 use crate::cloud_input::CloudInputError;
 
 /// Reason for dropping a cloud.

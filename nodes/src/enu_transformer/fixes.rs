@@ -6,7 +6,9 @@ use lattice_core::geodesy::{EnuFrame, Geodetic, ecef_from_geodetic};
 use lattice_core::pose::{PoseBuffer, PoseBufferOptions, PoseMiss, StampedPose};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::ins::{Body, BodyPose, InsOptions, InsRefusal};
+use super::body_pose::{Body, BodyPose};
+use super::ins_options::InsOptions;
+use super::ins_refusal::InsRefusal;
 use super::speed_gate::{Placed, SpeedGate, TooFast};
 use super::stamp_order::{Refused, StampOrder};
 

@@ -5,7 +5,7 @@ use lattice_core::geodesy::Geodetic;
 use lattice_core::pose::AttitudeConvention;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::ins::{HeightDatum, InsOptions, InsSource, InsStamp};
+use super::ins_options::{HeightDatum, InsOptions, InsSource, InsStamp};
 use crate::convert::cloud::Precision;
 use crate::convert::viewpoint::VIEWPOINT_FIELDS;
 use crate::options::{frame, one_of};

@@ -1,7 +1,7 @@
 //! Parameters of the transformer.
 
-use super::TransformerOptions;
-use super::ins::InsSource;
+use super::ins_options::InsSource;
+use super::options::TransformerOptions;
 use crate::compute::ComputeLimits;
 use crate::options::{self, FRAME, TOPIC};
 use crate::report;
@@ -34,9 +34,6 @@ const ABOUT: &[About] = about! {
     "earth_frame" fixed(FRAME): "Frame of the earth (ECEF).";
     "odom_frame" fixed(FRAME): "Odometry frame: if set, map -> odom_frame is published instead of map -> base_frame.";
     "publish_tf": "Whether transforms are published.";
-    "min_range_m": "Points nearer to the sensor are rejected.";
-    "max_range_m": "Points farther from the sensor are rejected; 0: no limit.";
-    "max_cloud_points": "Limit of points per cloud; larger clouds are rejected.";
     "deskew": "Whether points are motion-compensated by their own times.";
     "time.field": "Field of the time of points; empty: time, t, timestamp, offset_time, ts, stamp and the like, with or without a unit behind the name (_ns, _us, _ms, _s).";
     "time.unit": "auto, s, ms, us or ns.";

@@ -8,8 +8,8 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use nalgebra::Isometry3;
 
 use super::drops::Drop;
+use super::state::{EnuOutput, EnuTransformer};
 use super::waiting::WaitingCloud;
-use super::{EnuOutput, EnuTransformer};
 use crate::convert::cloud;
 
 impl EnuTransformer {

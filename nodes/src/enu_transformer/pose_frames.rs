@@ -1,48 +1,18 @@
-//! Machine poses in the map from poses of message frames: mounts of the INS, and
-//! reference frames.
+//! Machine poses in the map from poses of message frames.
 
 use std::sync::Arc;
 
 use lattice_core::geodesy::InsMount;
 use lattice_core::pose::{StampedPose, TfMiss};
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::Isometry3;
 
-use super::ins::{Body, BodyPose};
-use super::{EnuOutput, EnuTransformer};
+use super::body_mounts::{Missing, MissingOf};
+use super::body_pose::{Body, BodyPose};
+use super::reference::{Reference, WaitingPose};
+use super::state::{EnuOutput, EnuTransformer};
 
 /// Limit of poses that wait for transforms.
 const MAX_WAITING_POSES: usize = 4096;
-
-/// Pose that waits for its transforms.
-pub(super) struct WaitingPose {
-    topic: Arc<str>,
-    pose: BodyPose,
-    arrived_ns: i64,
-}
-
-/// Relation of the poses' reference frame to the map frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Reference {
-    /// Undecided.
-    Unknown,
-    /// Connected with the map frame by transforms.
-    OnTf,
-    /// Not connected with the map frame, so it is used as the map frame.
-    IsMap,
-}
-
-/// A missing transform of a pose.
-struct Missing {
-    miss: TfMiss,
-    of: MissingOf,
-}
-
-enum MissingOf {
-    /// `base_frame` <- frame of the INS.
-    Mount(Arc<str>),
-    /// `map_frame` <- reference frame of the pose.
-    Reference(Arc<str>),
-}
 
 impl EnuTransformer {
     /// Handles a pose of a frame; it is used once its transforms are known.
@@ -175,52 +145,6 @@ impl EnuTransformer {
                 None => reference_from_base,
             },
         })
-    }
-
-    /// Lever arm and boresight of the INS at a stamp; `None` where poses are those of the base.
-    #[cfg(feature = "bags")]
-    pub(super) fn ins_mount(
-        &self,
-        (position_of, attitude_of): &(Body, Body),
-        stamp_ns: i64,
-    ) -> Option<Isometry3<f64>> {
-        if (position_of, attitude_of) == (&Body::Base, &Body::Base) {
-            return None;
-        }
-        let lever_arm_m = self.lever_arm_m(position_of, stamp_ns).ok()?;
-        let rotation = self.base_from_ins(attitude_of, stamp_ns).ok()?;
-        Some(Isometry3::from_parts(lever_arm_m.into(), rotation))
-    }
-
-    /// Lever arm of a body at a stamp: from the parameter, else from tf.
-    fn lever_arm_m(&self, body: &Body, stamp_ns: i64) -> Result<Vector3<f64>, Missing> {
-        match (body, &self.options.ins.lever_arm_m) {
-            (Body::Ins(_), Some(lever_arm_m)) => Ok(*lever_arm_m),
-            _ => Ok(self.base_from_body(body, stamp_ns)?.translation.vector),
-        }
-    }
-
-    /// Rotation of a body on the machine at a stamp: from the parameter, else from tf.
-    fn base_from_ins(&self, body: &Body, stamp_ns: i64) -> Result<UnitQuaternion<f64>, Missing> {
-        match (body, &self.options.ins.base_from_ins) {
-            (Body::Ins(_), Some(base_from_ins)) => Ok(*base_from_ins),
-            _ => Ok(self.base_from_body(body, stamp_ns)?.rotation),
-        }
-    }
-
-    /// Mount of a body on tf at a stamp.
-    fn base_from_body(&self, body: &Body, stamp_ns: i64) -> Result<Isometry3<f64>, Missing> {
-        let base = &self.options.base_frame;
-        match body {
-            Body::Ins(frame) if !frame.is_empty() && **frame != **base => {
-                let found = self.mounts.lookup(base, frame, stamp_ns);
-                found.map_err(|miss| Missing {
-                    miss,
-                    of: MissingOf::Mount(Arc::clone(frame)),
-                })
-            }
-            _ => Ok(Isometry3::identity()),
-        }
     }
 
     /// Pose of the reference frame in the map; `None` if it is the map frame.

@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use lattice_core::pose::{PushOutcome, StampedPose};
 
-use super::ins::{InsRefusal, InsSource};
+use super::drops::Drop;
+use super::ins_options::InsSource;
+use super::ins_refusal::InsRefusal;
 use super::speed_gate::{Placed, TooFast};
 use super::stamp_order::Refused;
-use super::{Drop, EnuOutput, EnuTransformer};
+use super::state::{EnuOutput, EnuTransformer};
 
 impl EnuTransformer {
     /// Handles a pose of the machine in the map.

@@ -2,24 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use lattice_core::cloud::{CloudLimits, NO_TIME_NS};
 use lattice_core::pose::StampedPose;
 use lattice_core::registration::mounts::{BasePose, MountSamples};
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
-use super::EnuTransformer;
-use super::drops::Drop;
-use super::ins::Body;
-use super::waiting::WaitingCloud;
-use crate::convert::cloud;
+use super::body_pose::Body;
 
-/// Points of a cloud within this time share a pose, ns.
-const POSE_NS: i64 = 100_000;
 /// Least time between two poses of the way, ns, and the most of them: more than an hour.
 const WAY_NS: i64 = 20_000_000;
 const MAX_WAY: usize = 200_000;
-/// Points nearer to the sensor are of the machine itself, metres.
-const MIN_RANGE_M: f64 = 0.3;
 
 /// Mount of a sensor frame as the log states it.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,14 +31,14 @@ pub struct StatedMount {
 
 /// Point that is kept.
 #[derive(Clone, Copy, Debug)]
-struct Kept {
+pub(super) struct Kept {
     /// Number of the point in the log.
-    number: u64,
+    pub number: u64,
     /// Place of its pose.
-    pose: u32,
+    pub pose: u32,
     /// Place of its sensor in the mounts.
-    sensor: usize,
-    in_base_m: Vector3<f64>,
+    pub sensor: usize,
+    pub in_base_m: Vector3<f64>,
 }
 
 /// Points kept for the calibration of mounts.
@@ -56,19 +47,19 @@ pub struct Samples {
     /// Most points.
     limit: usize,
     /// A point is kept if its number, scrambled, has this many low bits that are 0.
-    thinning: u32,
-    seen: u64,
-    kept: Vec<Kept>,
-    poses: Vec<BasePose>,
-    sensor_sum_m: Vector3<f64>,
-    clouds: u32,
-    mounts: Vec<StatedMount>,
-    parents: BTreeMap<String, String>,
-    bodies: Option<(Body, Body)>,
+    pub(super) thinning: u32,
+    pub(super) seen: u64,
+    pub(super) kept: Vec<Kept>,
+    pub(super) poses: Vec<BasePose>,
+    pub(super) sensor_sum_m: Vector3<f64>,
+    pub(super) clouds: u32,
+    pub(super) mounts: Vec<StatedMount>,
+    pub(super) parents: BTreeMap<String, String>,
+    pub(super) bodies: Option<(Body, Body)>,
     way: Vec<StampedPose>,
     /// Least time between two poses of the way, ns.
     way_ns: i64,
-    base_from_ins: Option<Isometry3<f64>>,
+    pub(super) base_from_ins: Option<Isometry3<f64>>,
 }
 
 /// Samples of a log with the mounts that it states.
@@ -102,6 +93,15 @@ impl LogSamples {
 }
 
 impl Samples {
+    /// No samples yet; `limit` is the most of them.
+    pub(super) fn new(limit: usize) -> Self {
+        Self {
+            limit,
+            way_ns: WAY_NS,
+            ..Self::default()
+        }
+    }
+
     pub(super) fn note_parent(&mut self, child: &str, parent: &str) {
         let name = |frame: &str| frame.trim_start_matches('/').to_owned();
         // Frames are limited by the buffer of transforms; these only by the log.
@@ -131,12 +131,12 @@ impl Samples {
         }
     }
 
-    fn is_kept(number: u64, thinning: u32) -> bool {
+    pub(super) fn is_kept(number: u64, thinning: u32) -> bool {
         let scrambled = number.wrapping_mul(0x9E37_79B9_7F4A_7C15);
         (scrambled ^ (scrambled >> 32)).trailing_zeros() >= thinning
     }
 
-    fn thin(&mut self) {
+    pub(super) fn thin(&mut self) {
         if self.kept.len() <= self.limit {
             return;
         }
@@ -162,7 +162,7 @@ impl Samples {
         self.poses = poses;
     }
 
-    fn finish(self) -> LogSamples {
+    pub(super) fn finish(self) -> LogSamples {
         let points = self.kept.iter();
         LogSamples {
             sensors: self.kept.iter().map(|kept| kept.sensor).collect(),
@@ -175,108 +175,6 @@ impl Samples {
             mounts: self.mounts,
             base_from_ins: self.base_from_ins,
         }
-    }
-}
-
-impl EnuTransformer {
-    /// Keeps samples of the clouds, `limit` at most, in place of transforming them.
-    pub(crate) fn keep_samples(&mut self, limit: usize) {
-        self.samples = Some(Samples {
-            limit,
-            way_ns: WAY_NS,
-            ..Samples::default()
-        });
-    }
-
-    /// The samples kept.
-    pub(crate) fn take_samples(&mut self) -> LogSamples {
-        self.samples.take().map(Samples::finish).unwrap_or_default()
-    }
-
-    /// Samples of a cloud that poses and mounts cover.
-    pub(super) fn sample(&self, waiting: &WaitingCloud, samples: &mut Samples) -> Result<(), Drop> {
-        let layout = cloud::layout_of(&waiting.message);
-        let limits = CloudLimits {
-            max_points: self.options.max_cloud_points,
-        };
-        let view = layout
-            .view(&waiting.message.data, &limits)
-            .map_err(Drop::Malformed)?;
-        let base_from_sensor = self.stated_mount(waiting, samples)?;
-        samples.sensor_sum_m += base_from_sensor.translation.vector;
-        samples.clouds += 1;
-        let sensor = { samples.mounts.iter() }.position(|one| one.frame == waiting.frame);
-        let sensor = sensor.unwrap_or_default();
-        let mut places: BTreeMap<i64, Option<(u32, Isometry3<f64>)>> = BTreeMap::new();
-        for i in 0..view.len() {
-            samples.seen += 1;
-            if !Samples::is_kept(samples.seen, samples.thinning) {
-                continue;
-            }
-            let point_m = view.xyz(i);
-            let range_m = point_m.norm();
-            let least_m = self.options.min_range_m.max(MIN_RANGE_M);
-            if !(range_m > least_m && range_m <= self.options.max_range_m) {
-                continue;
-            }
-            let at_ns = match &waiting.times {
-                Some(times) => times.get(i).copied().filter(|at| *at != NO_TIME_NS),
-                None => Some(waiting.stamp_ns),
-            };
-            let Some(at_ns) = at_ns else { continue };
-            let bin = at_ns.div_euclid(POSE_NS);
-            let found = places.entry(bin).or_insert_with(|| {
-                let middle_ns = bin * POSE_NS + POSE_NS / 2;
-                let pose = BasePose::at(middle_ns, |at_ns| self.map_from_base(at_ns).ok())?;
-                let mount = self.mount(&waiting.frame, middle_ns).ok()?;
-                samples.poses.push(pose);
-                Some((samples.poses.len() as u32 - 1, mount))
-            });
-            if let Some((place, mount)) = found {
-                let in_base_m = (*mount * Point3::from(point_m)).coords;
-                samples.kept.push(Kept {
-                    number: samples.seen,
-                    pose: *place,
-                    sensor,
-                    in_base_m,
-                });
-            }
-        }
-        samples.thin();
-        Ok(())
-    }
-
-    /// Mount at the stamp of a cloud, noted at the first one of its frame.
-    fn stated_mount(
-        &self,
-        waiting: &WaitingCloud,
-        samples: &mut Samples,
-    ) -> Result<Isometry3<f64>, Drop> {
-        let (frame, stamp_ns) = (&waiting.frame, waiting.stamp_ns);
-        let mount = self.mount(frame, stamp_ns);
-        let base_from_sensor = mount.map_err(|miss| Drop::no_mount(frame, miss))?;
-        if let (None, Some(bodies)) = (samples.base_from_ins, &samples.bodies) {
-            samples.base_from_ins = self.ins_mount(bodies, stamp_ns);
-        }
-        if let Some(known) = samples.mounts.iter_mut().find(|one| one.frame == *frame) {
-            let change = known.base_from_sensor.inv_mul(&base_from_sensor);
-            known.is_moving |=
-                change.rotation.angle() > 1e-3 || change.translation.vector.norm() > 1e-3;
-            return Ok(base_from_sensor);
-        }
-        let parent = samples.parents.get(frame).cloned();
-        let base_from_parent = parent
-            .as_ref()
-            .and_then(|parent| self.mount(parent, stamp_ns).ok());
-        samples.mounts.push(StatedMount {
-            frame: frame.clone(),
-            topic: waiting.topic.to_string(),
-            base_from_parent: base_from_parent.unwrap_or_default(),
-            parent: parent.filter(|_| base_from_parent.is_some()),
-            base_from_sensor,
-            is_moving: false,
-        });
-        Ok(base_from_sensor)
     }
 }
 

@@ -2,8 +2,8 @@
 
 use lattice_core::pose::{PoseMiss, TfMiss};
 
-use super::EnuTransformer;
 use super::drops::Drop;
+use super::state::EnuTransformer;
 use super::waiting::WaitingCloud;
 
 /// Decision on a cloud at a time.

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use lattice_core::cloud::CloudError;
 use lattice_msgs::sensor_msgs::PointCloud2;
 
-use super::TransformerOptions;
 use super::cloud_clocks::CloudClock;
 use super::cloud_notes::CloudNotes;
 use super::cloud_times::CloudTimes;
+use super::options::TransformerOptions;
 use crate::convert::cloud;
 
 /// Cloud with a validated layout and the time of each point.

@@ -13,7 +13,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::PARAMETERS;
+use super::table::PARAMETERS;
 use crate::start::{Declare, NodeError};
 use lattice_runtime::params::{Addressed, Params, Unknown, addressed, is_near};
 use lattice_runtime::params_file;

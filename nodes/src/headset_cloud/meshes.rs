@@ -5,11 +5,11 @@ use std::sync::Arc;
 use lattice_msgs::lattice::HeadsetMesh;
 use lattice_msgs::visualization_msgs::Marker;
 
+use super::machine::{HeadsetCloud, HeadsetOutput};
 use super::marker::{FromMarker, from_marker};
 use super::refusal::{MeshRefusal, shown};
 use super::session::SessionUpdate;
 use super::surfaces::Change;
-use super::{HeadsetCloud, HeadsetOutput};
 use crate::mesh::LabelledMesh;
 
 /// Surface name of the mesh file.

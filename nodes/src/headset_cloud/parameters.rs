@@ -21,14 +21,9 @@ const ABOUT: &[About] = about! {
     "max_surfaces": "Limit of surfaces; further ones are rejected.";
     "queue_size": "Label images queued for pose, mesh and confidence; the oldest is dropped and counted.";
     "use_confidence" fixed(options::TOPIC): "Whether labels wait for headset/labels/confidence of their stamp.";
-    "rectified": "Whether the images are rectified: p of camera_info is used, otherwise k and the distortion.";
-    "max_image_pixels": "Limit of pixels per image; larger images are rejected.";
-    "stride": "Step between the rows and columns that become points.";
-    "min_range_m": "Points nearer to the sensor are rejected.";
     "max_range_m": "Points farther from the sensor are rejected.";
     "check_winding": "Whether images that see most of the mesh from behind are rejected: it is mirrored, or its triangles are reversed.";
     "threads" fixed("the pool is made with it"): "Threads of the network; 0: one less than the number of cores.";
-    "group_labels": "Groups of classes: class, group, class, group and so on.";
 };
 
 /// Settings from the parameters of the node.
@@ -66,11 +61,7 @@ impl Settings {
             network: network.map(|network| (network, of_network)),
             compressed_color: params.bool("compressed_color", false)?,
             mesh_file: params.string("mesh_file", "")?,
-            limits: ComputeLimits {
-                events: options::inbox_events(params, 4096)?,
-                bytes: options::inbox_bytes(params, 128 << 20)?,
-                threads: 1,
-            },
+            limits: options::compute_limits(params, 4096, 128 << 20, 1)?,
             report_file: report::file(params)?,
         })
     }

@@ -7,8 +7,8 @@ use std::time::Duration;
 use lattice_runtime::Shutdown;
 use lattice_runtime::params::{ParamError, Params};
 
-use super::LatticeMapper;
 use super::map_folder::{MapFolder, Refusal};
+use super::state::LatticeMapper;
 use crate::start::NodeError;
 
 /// Longest settable period between saves.

@@ -6,7 +6,8 @@ use lattice_core::raycast::FreeSpaceError;
 use lattice_core::voxels::VoxelStore;
 use nalgebra::Vector3;
 
-use super::{LatticeMapper, MapperOptions};
+use super::options::MapperOptions;
+use super::state::LatticeMapper;
 
 /// Automatic datums are multiples of this, m.
 const DATUM_TILE_M: f64 = 1024.0;

@@ -1,25 +1,24 @@
 //! ROS node around [`LatticeMapper`].
 
-mod status;
-
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, Once};
-use std::thread::JoinHandle;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Once};
 use std::time::Duration;
 
-use lattice_msgs::geographic_msgs::GeoPointStamped;
 use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::vision_msgs::LabelInfo;
 
 use super::autosave::Autosave;
-use super::map_folder::MapFolder;
+use super::call::Call;
+use super::compute_state::{ComputeState, NO_VIEWPOINTS, UpdateRequests};
+use super::corrected::CorrectedDrive;
 use super::octomap::{self, Octomaps};
+use super::options::MapperOptions;
 use super::outputs::Outputs;
 use super::parameters::Settings;
-use super::services::{self, Call};
+use super::services;
+use super::state::LatticeMapper;
 use super::unmapped::Unmapped;
-use super::{CorrectedDrive, LatticeMapper, MapperOptions};
 use crate::compute::{Compute, Inbox};
 use crate::convert::cloud;
 use crate::hurry::Hurry;
@@ -28,10 +27,7 @@ use crate::report;
 use crate::start::{Finish, LAST_EVENTS, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Losses, Runtime, SubscriptionExecutor, lock};
-
-/// Warning for clouds without viewpoints while free space is on.
-const NO_VIEWPOINTS: &str = "no sensor positions (vp_x, vp_y, vp_z), so no free space: set `viewpoints: true` of enu_transformer";
+use lattice_runtime::{Losses, Runtime, SubscriptionExecutor, lock};
 
 /// Event for the compute thread.
 enum Event {
@@ -192,47 +188,11 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// Requests for the next update, kept independently of the inbox.
-#[derive(Default)]
-struct UpdateRequests {
-    centers: AtomicBool,
-    origin: Mutex<Option<Arc<GeoPointStamped>>>,
-}
-
 /// Sends a timer event; one rejected by a full inbox is repeated at the next period.
 fn notify(inbox: &Inbox<Event>, event: Event) {
     if !inbox.send(event, 0) {
         log::debug!("the inbox is full");
     }
-}
-
-/// State of the compute thread.
-struct ComputeState {
-    machine: LatticeMapper,
-    /// Present if corrections are followed.
-    drive: Option<CorrectedDrive>,
-    autosave: Autosave,
-    output: MapOutput,
-    octomaps: Option<Octomaps>,
-    outputs: Outputs,
-    diagnostics: Diagnostics,
-    /// Present until there is a map.
-    unmapped: Option<Unmapped>,
-    /// Clouds rejected by a full inbox.
-    lost: Arc<AtomicU64>,
-    /// Losses before the inbox: of clouds, and of all inputs.
-    clouds: Losses,
-    inputs: Losses,
-    refusals: Throttle,
-    no_viewpoints: Once,
-    update_requests: Arc<UpdateRequests>,
-    /// Thread that writes a map file.
-    writing: Option<JoinHandle<()>>,
-    /// Folder of map files.
-    maps: MapFolder,
-    /// State of the last published centres.
-    centers_of: Option<(u64, u64)>,
-    report_file: String,
 }
 
 impl ComputeState {

@@ -8,8 +8,8 @@ use lattice_msgs::lattice::ClearBoxRequest;
 use lattice_msgs::octomap_msgs::{BoundingBoxQuery, GetOctomap, GetOctomapResponse, Octomap};
 use lattice_msgs::std_srvs::{Empty, EmptyResponse};
 
-use super::LatticeMapper;
-use super::services::Call;
+use super::call::Call;
+use super::state::LatticeMapper;
 use crate::compute::Inbox;
 use crate::octree::OctreeForm;
 use crate::start::{LAST_EVENTS, LAST_FLUSH};

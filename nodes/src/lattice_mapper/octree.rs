@@ -3,7 +3,7 @@
 use lattice_core::lattice::MortonKey;
 use lattice_msgs::octomap_msgs::Octomap;
 
-use super::LatticeMapper;
+use super::state::LatticeMapper;
 use crate::octree::{CLASS, LOG_ODDS_OCCUPIED, OctreeError, OctreeForm, OctreeVoxels, UNKNOWN};
 
 /// Limit of an octree in a message, bytes.

@@ -10,7 +10,7 @@ use lattice_msgs::lattice::{ClearBoxRequest, ClearBoxResponse, QueryMapRequest, 
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use super::LatticeMapper;
+use super::state::LatticeMapper;
 
 /// Reason why a map was not loaded. The current map is unchanged.
 #[derive(Debug, Error)]

@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use super::autosave::AutosaveOptions;
+use super::free_options::FreeSpaceMethod;
 use super::map_folder::MapFolder;
-use super::{FreeSpaceMethod, MapperOptions};
+use super::options::MapperOptions;
 use crate::compute::ComputeLimits;
 use crate::{options, report};
 use lattice_runtime::about;
@@ -38,10 +39,8 @@ const ABOUT: &[About] = about! {
     "max_map_bytes" fixed(MAP): "Memory limit for voxels, bytes, at the worst 330 for each; 0: limited by max_voxels only.";
     "when_full": "Policy for a full map: refuse (points in new cells are rejected and counted) or forget_oldest (an eighth of the voxels is removed, those without points for longest).";
     "forget_after_s": "Age limit of voxels since their last point, by the stamps of the clouds; 0: none, not settable at run time. Costs 16 bytes a voxel and insertion time. Clouds whose stamps jump by more than half of it, and a second, are rejected and counted until five in a row agree on the new time.";
-    "max_cloud_points": "Limit of points per cloud; larger clouds are rejected.";
     "keep_labels" fixed(MAP): "Whether labels are counted in each voxel: voxel_map, voxel_map_updates and map_centers then contain the most frequent one. Costs 24 bytes a voxel, 8 for each of its labels, and insertion time.";
     "chunk_bytes": "Largest message of voxel_map and voxel_map_updates, bytes. Above 60 kB reliable messages are fragmented, and repair is slow.";
-    "update_period_s": "Period of voxel_map_updates.";
     "centers_period_s": "Period of map_centers, octomap_binary and octomap_full.";
     "free_period_s": "Period of free.";
     "map_dir" fixed("it names outputs"): "Folder of the files of ~/save_map and ~/load_map; by default the working directory. Only map files are replaced.";
@@ -84,11 +83,7 @@ impl Settings {
         }
         let has_free = mapper.free_space.free_level > 0;
         Ok(Self {
-            limits: ComputeLimits {
-                events: options::inbox_events(params, 4096)?,
-                bytes: options::inbox_bytes(params, 256 << 20)?,
-                threads: options::threads(params, 0)?,
-            },
+            limits: options::compute_limits(params, 4096, 256 << 20, options::threads(params, 0)?)?,
             maps: MapFolder::from_params(params)?,
             autosave: AutosaveOptions::from_params(params)?,
             update_period: options::period(params, "update_period_s", 0.2)?,

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use lattice_core::query::{Path, PathError, PathOptions, Query, Steps};
@@ -11,9 +12,8 @@ use lattice_msgs::lattice::{PlanPathRequest, PlanPathResponse};
 use lattice_runtime::{Reply, lock};
 use nalgebra::Vector3;
 
-use super::LatticeMapper;
 use super::operations::vector;
-use super::services::{BUSY, spawn};
+use super::state::LatticeMapper;
 
 /// Limits of a search: expanded cells, some three seconds of them, and time.
 const MAX_EXPANDED: usize = 2_000_000;
@@ -60,7 +60,8 @@ impl Planner {
             planner.free();
             reply.send(answer);
         };
-        if let Err(error) = spawn("plan path", search) {
+        let thread = thread::Builder::new().name("plan path".to_owned());
+        if let Err(error) = thread.spawn(search) {
             self.free();
             late.send(failed(error));
         }
@@ -92,11 +93,6 @@ pub(super) fn failed(why: impl ToString) -> PlanPathResponse {
         message: why.to_string(),
         ..PlanPathResponse::default()
     }
-}
-
-/// Reply while another search runs.
-pub(super) fn busy() -> PlanPathResponse {
-    failed(format!("another search is running: {BUSY}"))
 }
 
 /// Searches a path; stops once `go_on` returns false.

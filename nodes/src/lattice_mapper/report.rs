@@ -3,7 +3,9 @@
 use lattice_core::voxels::Distortion;
 use serde::{Deserialize, Serialize};
 
-use super::{CorrectionCounts, LatticeMapper, MapperCounts};
+use super::corrected::CorrectionCounts;
+use super::counts::MapperCounts;
+use super::state::LatticeMapper;
 use crate::convert::map;
 
 /// Report of a `lattice_mapper`.

@@ -8,38 +8,23 @@ use lattice_core::voxels::Region;
 use lattice_core::voxels::file::MapContents;
 use lattice_msgs::RosService;
 use lattice_msgs::lattice::{
-    ClearBox, ClearBoxRequest, ClearBoxResponse, LoadMap, LoadMapRequest, LoadMapResponse,
-    PlanPath, PlanPathRequest, PlanPathResponse, QueryMap, QueryMapRequest, QueryMapResponse,
-    SaveMap, SaveMapRequest, SaveMapResponse,
+    ClearBox, ClearBoxResponse, LoadMap, LoadMapRequest, LoadMapResponse, PlanPath, QueryMap,
+    QueryMapResponse, SaveMap, SaveMapRequest, SaveMapResponse,
 };
 
-use lattice_msgs::octomap_msgs::{BoundingBoxQueryResponse, GetOctomapResponse};
+use lattice_msgs::octomap_msgs::BoundingBoxQueryResponse;
 
-use super::LatticeMapper;
+use super::call::Call;
 use super::map_folder::MapFolder;
 use super::octomap;
 use super::operations::region_of;
 use super::plan::{self, Planner};
+use super::state::LatticeMapper;
 use crate::compute::Inbox;
-use crate::octree::OctreeForm;
 use crate::start::NodeError;
 use lattice_runtime::{Node, Reply, Server};
 
-pub(super) const BUSY: &str = "the inbox of the node is full: call again";
-
-/// Request handled by the compute thread.
-pub(super) enum Call {
-    Save(SaveMapRequest, Reply<SaveMapResponse>),
-    /// Load the map that was read.
-    Load(Box<MapContents>, Reply<LoadMapResponse>),
-    ClearBox(ClearBoxRequest, Reply<ClearBoxResponse>),
-    ClearBoundingBox(ClearBoxRequest, Reply<BoundingBoxQueryResponse>),
-    Query(QueryMapRequest, Reply<QueryMapResponse>),
-    /// Encode an octree.
-    Octomap(OctreeForm, Reply<GetOctomapResponse>),
-    /// Plan a path with the reserved planner.
-    Plan(PlanPathRequest, Reply<PlanPathResponse>, Arc<Planner>),
-}
+const BUSY: &str = "the inbox of the node is full: call again";
 
 /// Serves all calls; `wrap` converts one to an event.
 pub(super) fn serve<E: Send + 'static>(
@@ -69,7 +54,7 @@ pub(super) fn serve<E: Send + 'static>(
     let plan = node.service_later::<PlanPath>("~/plan_path", move |request, reply| {
         let late = reply.clone();
         if !planner.take() {
-            late.send(plan::busy());
+            late.send(plan::failed(format!("another search is running: {BUSY}")));
         } else if !to.send(wrap(Call::Plan(request, reply, Arc::clone(&planner))), 0) {
             planner.free();
             late.send(plan::failed(BUSY));
@@ -169,10 +154,7 @@ pub(super) fn answer(
     done
 }
 
-pub(super) fn spawn(
-    name: &str,
-    work: impl FnOnce() + Send + 'static,
-) -> std::io::Result<JoinHandle<()>> {
+fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<JoinHandle<()>> {
     thread::Builder::new().name(name.to_owned()).spawn(work)
 }
 

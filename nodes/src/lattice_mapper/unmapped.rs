@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::MapperCounts;
+use super::counts::MapperCounts;
 
 /// Time and cause of an empty map.
 pub(super) struct Unmapped {

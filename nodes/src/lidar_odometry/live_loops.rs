@@ -10,7 +10,7 @@ use lattice_core::odometry::Verdict;
 use lattice_runtime::lock;
 use nalgebra::{Isometry3, Vector3};
 
-use super::Registered;
+use super::machine::Registered;
 use crate::convert::corrections::PlacedCorrections;
 
 /// Capacity of the queue of segments: hundreds of metres of path.

@@ -2,7 +2,7 @@
 
 use lattice_core::loop_closure::{LoopCloser, Segment};
 
-use super::{LidarOdometry, Registered};
+use super::machine::{LidarOdometry, Registered};
 
 /// Loops of one drive, whose scans come one by one.
 #[derive(Default)]

@@ -48,11 +48,7 @@ impl Settings {
         Ok(Self {
             odometry,
             map_frame: Some(map_frame.to_owned()).filter(|frame| !frame.is_empty()),
-            limits: ComputeLimits {
-                events: options::inbox_events(params, 256)?,
-                bytes: options::inbox_bytes(params, 64 << 20)?,
-                threads: options::threads(params, 0)?,
-            },
+            limits: options::compute_limits(params, 256, 64 << 20, options::threads(params, 0)?)?,
             report_file: report::file(params)?,
         })
     }

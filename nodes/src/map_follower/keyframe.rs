@@ -3,8 +3,10 @@
 use lattice_core::lattice::MortonKey;
 use lattice_msgs::lattice::LatticeMap;
 
+use super::followed::{FollowError, Followed};
+use super::followed_map::FollowedMap;
+use super::follower::{MapFollower, PATIENCE_S, check_chunk};
 use super::incomplete::Staging;
-use super::{FollowError, Followed, FollowedMap, MapFollower, PATIENCE_S, check_chunk};
 use crate::convert::map::{self, History, VoxelState};
 
 impl MapFollower {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{MergedLabels, MergerOptions};
+use super::options::{MergedLabels, MergerOptions};
 use crate::compute::ComputeLimits;
 use crate::{options, report};
 use lattice_runtime::about;
@@ -14,7 +14,6 @@ const ABOUT: &[About] = about! {
     "max_voxels": "Voxel limit of the merged map, and of each robot's.";
     "labels" fixed("the map is made with it"): "Labels of the merged map: own (those of the maps; of each robot only the most frequent one of a voxel is known), robots (the robots themselves, with their names on label_info), or none.";
     "chunk_bytes": "Largest message of voxel_map and voxel_map_updates, bytes.";
-    "update_period_s": "Period of voxel_map_updates.";
 };
 
 const MAX_ROBOTS: usize = 1000;
@@ -64,11 +63,7 @@ impl Settings {
                 labels: options::one_of(params, "labels", &LABELS)?,
                 chunk_bytes: options::chunk_bytes(params, 60_000)?,
             },
-            limits: ComputeLimits {
-                events: options::inbox_events(params, 4096)?,
-                bytes: options::inbox_bytes(params, 64 << 20)?,
-                threads: options::threads(params, 1)?,
-            },
+            limits: options::compute_limits(params, 4096, 64 << 20, options::threads(params, 1)?)?,
             period: options::period(params, "update_period_s", 1.0)?,
             mapper: params.string("mapper", "lattice_mapper")?,
             report_file: report::file(params)?,

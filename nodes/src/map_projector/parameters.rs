@@ -19,7 +19,6 @@ const ABOUT: &[About] = about! {
     "occupancy_max_z_m": "With ground: flat, upper bound of the height band in the map frame.";
     "base_frame" fixed(FRAME): "Frame of the robot, whose position by /tf selects the ground; without it: the lowest large surface.";
     "room_m": "Room on each side of a grid that has to grow.";
-    "max_voxels": "Voxel limit of the followed map.";
     "update_period_s": "Shortest time between two changes of the grid.";
     "grid_period_s": "Shortest time between two whole grids where a subscriber of projected_map takes no updates.";
 };
@@ -42,11 +41,7 @@ impl Settings {
         params.describe(options::COMMON);
         Ok(Self {
             projector: MapProjectorOptions::from_params(params)?,
-            limits: ComputeLimits {
-                events: options::inbox_events(params, 4096)?,
-                bytes: options::inbox_bytes(params, 64 << 20)?,
-                threads: options::threads(params, 1)?,
-            },
+            limits: options::compute_limits(params, 4096, 64 << 20, options::threads(params, 1)?)?,
             base_frame: options::frame(params, "base_frame", "base_link")?,
             update_period: options::period(params, "update_period_s", 0.5)?,
             grid_period: options::period(params, "grid_period_s", 2.0)?,

@@ -2,7 +2,10 @@
 
 use lattice_core::raycast::LOG_ODDS_STEP;
 
-use super::{LEVELS, OctreeError};
+use super::error::OctreeError;
+
+/// Levels of a tree below its root.
+pub const LEVELS: u32 = 16;
 
 /// Value of an unknown voxel.
 pub const UNKNOWN: i8 = i8::MIN;

@@ -3,34 +3,12 @@
 use lattice_core::lattice::{Lattice, LatticeIndex};
 use nalgebra::Vector3;
 use rustc_hash::FxHashSet;
-use thiserror::Error;
 
-use super::encode::{BLOCK_LEVELS, BLOCK_VOXELS, EncodedTree, Encoder, OctreeForm};
-use super::{HALF, LEVELS};
+use super::encode::{BLOCK_LEVELS, BLOCK_VOXELS, EncodedTree, Encoder, LEVELS, OctreeForm};
+use super::error::OctreeError;
 
-/// Reason for a tree that cannot be made.
-#[derive(Clone, PartialEq, Debug, Error)]
-pub enum OctreeError {
-    /// Cell outside the tree, which has 65536 voxels per edge, centred at the origin.
-    #[error(
-        "the cell at {center_m:.1?} m is outside an octree of these cells, which reaches {limit_m} m from the \
-         origin of the map: take larger cells, or a part of the map by `lattice map crop`"
-    )]
-    Outside {
-        /// Centre of a cell.
-        center_m: [f64; 3],
-        /// Half the edge of the tree.
-        limit_m: f64,
-    },
-    /// More bytes than the caller allows.
-    #[error(
-        "the octree has more than {max_bytes} bytes: take larger cells, or shorter rays (`rays.max_range_m`)"
-    )]
-    TooLarge {
-        /// Limit of the nodes.
-        max_bytes: usize,
-    },
-}
+/// Voxels on each side of the centre of a tree.
+pub const HALF: i64 = 1 << (LEVELS - 1);
 
 /// Voxels with half the cell size of a lattice, each with the value of the cell that its centre lies in.
 ///

@@ -6,6 +6,7 @@ use lattice_msgs::sensor_msgs::{CameraInfo, CompressedImage, Image};
 use lattice_msgs::vision_msgs::LabelInfo;
 use lattice_runtime::params::{ParamError, Params};
 
+use super::camera_input::CameraInput;
 use super::images::{self, Calibration, ImageTopic};
 use super::survey;
 use super::topics::{Role, TopicError};
@@ -38,37 +39,6 @@ impl CameraWishes {
             with_color: has_network || cloud.pair.with_color,
             has_palette: !cloud.classes.palette.is_empty(),
         })
-    }
-}
-
-/// Input of a depth camera.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CameraInput {
-    /// Depth images.
-    Depth,
-    /// Depth images of compressed_depth_image_transport.
-    CompressedDepth,
-    /// Calibration of the depth images.
-    Info,
-    /// Label images.
-    Labels,
-    /// Class names.
-    LabelInfo,
-    /// Confidences of the labels.
-    Confidence,
-    /// Colour images.
-    Color,
-    /// Colour images as JPEG.
-    CompressedColor,
-}
-
-impl CameraInput {
-    /// True for images that depth images are matched with.
-    pub fn is_companion(self) -> bool {
-        matches!(
-            self,
-            Self::Labels | Self::Confidence | Self::Color | Self::CompressedColor
-        )
     }
 }
 

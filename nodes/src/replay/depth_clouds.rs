@@ -8,9 +8,10 @@ use lattice_msgs::sensor_msgs::PointCloud2;
 use lattice_runtime::Shutdown;
 use lattice_runtime::params::{ParamError, Params};
 
+use super::camera_input::CameraInput;
 use super::camera_report::CameraReport;
-use super::cameras::{CameraInput, DepthCamera};
-use super::plan::TopicPlan;
+use super::cameras::DepthCamera;
+use super::topic_plan::TopicPlan;
 use crate::camera::LabelSet;
 use crate::segmenter::{Labelled, Segmenter};
 use crate::semantic_cloud::{

@@ -2,9 +2,12 @@
 
 use lattice_bag::BagReader;
 
-use super::{Pipeline, Slice, TopicError, TopicPlan};
+use super::pipeline::{Pipeline, run};
+use super::report::RunReport;
+use super::slice::Slice;
+use super::topic_plan::TopicPlan;
+use super::topics::TopicError;
 use crate::enu_transformer::{LogSamples, TransformerOptions};
-use crate::replay::RunReport;
 use crate::voxel_marker_publisher::MarkerOptions;
 use lattice_core::raycast::FreeSpaceError;
 use thiserror::Error;
@@ -34,6 +37,6 @@ pub fn mount_samples(
 ) -> Result<(LogSamples, RunReport), SampleError> {
     let mut pipeline = Pipeline::new(transformer, [], &MarkerOptions::default())?;
     pipeline.transformer.keep_samples(limit);
-    let report = super::run(bag, plan, slice, &mut pipeline, "", progress)?;
+    let report = run(bag, plan, slice, &mut pipeline, "", progress)?;
     Ok((pipeline.transformer.take_samples(), report))
 }

@@ -5,9 +5,9 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::sensor_msgs::Imu;
 use lattice_msgs::tf2_msgs::TFMessage;
 
-use super::plan::{TopicWishes, find};
 use super::survey::{self, CloudTopic, FrameTree, PoseTopic};
-use super::topics::{TopicError, listing};
+use super::topic_plan::TopicWishes;
+use super::topics::{TopicError, find, listing};
 use crate::cloud_input::CloudType;
 use crate::enu_transformer::ins::InsSource;
 

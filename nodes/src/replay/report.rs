@@ -5,7 +5,8 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{CameraReport, ScanPosesReport};
+use super::camera_report::CameraReport;
+use super::scan_poses::ScanPosesReport;
 use crate::enu_transformer::{Refusal, TransformerReport};
 use crate::lattice_mapper::MapperReport;
 use crate::voxel_marker_publisher::MarkerReport;

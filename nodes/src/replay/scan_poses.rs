@@ -11,7 +11,7 @@ use lattice_msgs::sensor_msgs::{Imu, PointCloud2};
 use lattice_msgs::tf2_msgs::TFMessage;
 use serde::{Deserialize, Serialize};
 
-use super::plan::TopicPlan;
+use super::topic_plan::TopicPlan;
 use super::topics::{Role, TopicError};
 use crate::cloud_input::SensorCloud;
 use crate::enu_transformer::Refusal;

@@ -1,6 +1,6 @@
 //! Part of a log.
 
-use super::TopicError;
+use super::topics::TopicError;
 
 /// Part of a log by log time, from its beginning.
 #[derive(Clone, Copy, PartialEq, Debug)]

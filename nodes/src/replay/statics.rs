@@ -8,8 +8,8 @@ use lattice_msgs::geometry_msgs::TransformStamped;
 use lattice_msgs::tf2_msgs::TFMessage;
 use nalgebra::Isometry3;
 
-use super::plan::TopicPlan;
 use super::survey::{MAX_TF_MESSAGES, bare};
+use super::topic_plan::TopicPlan;
 use super::topics::{Role, TopicError};
 use crate::convert::geometry;
 

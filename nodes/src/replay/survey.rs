@@ -12,7 +12,7 @@ use lattice_msgs::sensor_msgs::Imu;
 use lattice_msgs::tf2_msgs::TFMessage;
 use serde::de::DeserializeOwned;
 
-use super::TopicError;
+use super::topics::TopicError;
 use crate::cloud_input::CloudType;
 use crate::convert::geometry;
 

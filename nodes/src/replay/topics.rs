@@ -3,7 +3,7 @@
 use lattice_bag::{BagError, BagReader};
 use thiserror::Error;
 
-use super::cameras::CameraInput;
+use super::camera_input::CameraInput;
 use crate::cloud_input::CloudType;
 use lattice_runtime::params::ParamError;
 
@@ -127,4 +127,20 @@ pub(super) fn listing(bag: &BagReader) -> String {
         true => "no topics".into(),
         false => names.join(", "),
     }
+}
+
+/// Place of a topic of a type that the user names.
+pub(super) fn find(
+    bag: &BagReader,
+    name: &str,
+    type_name: &'static str,
+) -> Result<usize, TopicError> {
+    let mut topics = bag.topics().iter();
+    topics
+        .position(|topic| topic.name == name && topic.type_name == type_name)
+        .ok_or_else(|| TopicError::Missing {
+            name: name.to_owned(),
+            type_name,
+            has: listing(bag),
+        })
 }

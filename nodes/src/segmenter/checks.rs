@@ -2,6 +2,7 @@
 
 use tract_onnx::pb::tensor_proto::DataLocation;
 use tract_onnx::pb::{AttributeProto, GraphProto, ModelProto, NodeProto, TensorProto};
+use tract_onnx::prelude::TractError;
 
 /// Limit of values per tensor: 1 GiB of floats.
 pub(super) const MAX_TENSOR_VALUES: usize = 1 << 28;
@@ -18,6 +19,13 @@ pub(super) fn shown(text: &str) -> String {
         .filter(|c| !c.is_control())
         .take(SHOWN)
         .collect()
+}
+
+/// First line of an error, without the chain of operators.
+pub(super) fn first_line(error: &TractError) -> String {
+    let text = error.chain().map(|cause| shown(&cause.to_string()));
+    let text: Vec<String> = text.collect();
+    text.join(": ")
 }
 
 /// Checks that all operators are known and that tensors contain their stated values.

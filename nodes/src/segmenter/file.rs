@@ -1,10 +1,8 @@
 //! Reading and validation of model files, common to all backends.
 
-use std::fs::File;
-use std::io::{self, Cursor, Read};
+use std::io::{Cursor, Read};
 use std::path::Path;
 
-use rustix::fs::{Mode, OFlags};
 use tract_onnx::Onnx;
 use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::Framework;
@@ -12,23 +10,10 @@ use tract_onnx::prelude::Framework;
 use super::checks::{self, MAX_TENSOR_VALUES};
 use super::names;
 use super::network::{ModelError, Network, Size, Values};
+use super::regular_file::open;
 
 /// Largest model file, bytes: the format is limited to 2 GiB.
 const MAX_MODEL_BYTES: u64 = 1 << 30;
-
-/// Opens a regular file: pipes and devices could block.
-pub(super) fn open(path: &Path) -> io::Result<File> {
-    // Without waiting for the writer of a pipe.
-    let flags = OFlags::RDONLY | OFlags::NONBLOCK | OFlags::CLOEXEC;
-    let file = File::from(rustix::fs::open(path, flags, Mode::empty())?);
-    match file.metadata()?.is_file() {
-        true => Ok(file),
-        false => Err(io::Error::new(
-            io::ErrorKind::InvalidInput,
-            "not a regular file",
-        )),
-    }
-}
 
 /// Bytes of a model's file.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, ModelError> {

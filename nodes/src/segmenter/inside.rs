@@ -5,9 +5,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use lattice_msgs::vision_msgs::LabelInfo;
 
+use super::counts::SegmenterCounts;
+use super::machine::Segmenter;
+use super::options::SegmenterOptions;
 use super::parameters::NetworkSettings;
 use super::worker::{Input, NetworkEvent, Worker, WorkerState};
-use super::{Segmenter, SegmenterCounts, SegmenterOptions};
+
 use crate::compute::Inbox;
 use crate::report;
 use crate::start::NodeError;

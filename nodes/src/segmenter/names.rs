@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::network::MAX_CLASSES;
+use super::regular_file::open;
 
 /// Limit of names text, bytes.
 const MAX_BYTES: u64 = 1 << 20;
@@ -74,7 +75,7 @@ struct Config {
 }
 
 fn beside(path: &Path) -> Result<Vec<String>, String> {
-    let Ok(file) = super::file::open(path) else {
+    let Ok(file) = open(path) else {
         return Ok(Vec::new());
     };
     let mut text = String::new();

@@ -5,9 +5,9 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use super::backends::read_network_by;
 use super::network::{Backend, ModelError, Network, Size};
-use super::options::input_size;
-use super::{SegmenterOptions, read_network_by};
+use super::options::{SegmenterOptions, input_size};
 use crate::compute::ComputeLimits;
 use crate::{options, report};
 use lattice_runtime::params::{About, ParamError, Params};
@@ -17,7 +17,6 @@ const MODEL: &str = "the network is made at the start";
 const ABOUT: &[About] = about! {
     "model" fixed(MODEL): "Network, an ONNX file: one image in (1 x 3 x rows x columns), scores of classes or classes out.";
     "compressed" fixed(options::TOPIC): "Whether images are taken from rgb/image_rect_color/compressed (JPEG).";
-    "max_image_pixels": "Limit of pixels per image; larger images are rejected.";
 };
 
 /// Parameters of a network, in any node.

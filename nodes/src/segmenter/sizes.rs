@@ -8,10 +8,9 @@ use tract_onnx::prelude::*;
 use tract_onnx::tract_hir::infer::Factoid;
 use tract_onnx::tract_hir::internal::DimLike;
 
-use super::checks::{self, MAX_TENSOR_VALUES};
+use super::checks::{self, MAX_TENSOR_VALUES, first_line};
 use super::file;
 use super::network::Size;
-use super::tract::first_line;
 
 /// Limit of shape inference rounds; each covers the whole graph in order.
 const MAX_ROUNDS: usize = 32;

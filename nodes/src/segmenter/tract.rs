@@ -16,8 +16,9 @@ use tract_onnx::prelude::*;
 use tract_onnx::tract_hir::tract_core::plan::{self, SimplePlan};
 use tract_onnx::tract_hir::tract_core::runtime::RunOptions;
 
+use super::checks::first_line;
 use super::network::{Interrupter, ModelError, Network, Scores, Size, Values};
-use super::{checks, file, sizes};
+use super::{file, sizes};
 
 /// Network of a file, prepared for images of one size.
 pub(super) struct OnnxNetwork {
@@ -150,11 +151,4 @@ fn scores_of(output: &Tensor) -> Result<Scores, String> {
         return Err("its output is empty".to_owned());
     }
     Ok(Scores { size, values })
-}
-
-/// First line of an error, without the chain of operators.
-pub(super) fn first_line(error: &TractError) -> String {
-    let text = error.chain().map(|cause| checks::shown(&cause.to_string()));
-    let text: Vec<String> = text.collect();
-    text.join(": ")
 }

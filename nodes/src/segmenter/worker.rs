@@ -8,8 +8,11 @@ use std::time::{Duration, Instant};
 use lattice_msgs::sensor_msgs::{CompressedImage, Image};
 use lattice_msgs::vision_msgs::LabelInfo;
 
+use super::counts::SegmenterCounts;
+use super::labels::Labelled;
+use super::machine::Segmenter;
 use super::network::Interrupter;
-use super::{Labelled, Segmenter, SegmenterCounts, SegmenterOptions};
+use super::options::SegmenterOptions;
 use crate::camera::LabelSet;
 use crate::compute::{Compute, ComputeLimits, Inbox};
 use lattice_runtime::Shutdown;

@@ -15,14 +15,8 @@ const ABOUT: &[About] = about! {
     "use_confidence" fixed(options::TOPIC): "Whether labels wait for labels/confidence of their stamp.";
     "use_color" fixed(options::TOPIC): "Whether points have the colours of rgb/image_rect_color, for which labels wait by stamp; always with model.";
     "compressed_depth" fixed(options::TOPIC): "Whether depth is taken from depth_registered/image_rect/compressedDepth (PNG).";
-    "rectified": "Whether the images are rectified: p of camera_info is used, otherwise k and the distortion.";
-    "max_image_pixels": "Limit of pixels per image; larger images are rejected.";
-    "stride": "Step between the rows and columns that become points.";
-    "min_range_m": "Points nearer to the sensor are rejected.";
-    "max_range_m": "Points farther from the sensor are rejected; 0: no limit.";
     "edge_jump": "Largest depth difference to the eight adjacent pixels, as a fraction: pixels beyond it are rejected, since labels bleed at edges; 0: none.";
     "threads" fixed("the pool is made with it"): "Threads of the network; 0: one less than the number of cores.";
-    "group_labels": "Groups of classes: class, group, class, group and so on.";
 };
 
 /// Settings from the parameters of the node.
@@ -69,11 +63,7 @@ impl Settings {
             compressed_color,
             cloud,
             network: network.map(|network| (network, of_network)),
-            limits: ComputeLimits {
-                events: options::inbox_events(params, 4096)?,
-                bytes: options::inbox_bytes(params, 128 << 20)?,
-                threads: 1,
-            },
+            limits: options::compute_limits(params, 4096, 128 << 20, 1)?,
             report_file: report::file(params)?,
         })
     }

@@ -2,7 +2,8 @@
 
 use lattice_runtime::Level;
 
-use super::{SemanticIcpServer, ServerReport};
+use super::counts::ServerReport;
+use super::state::SemanticIcpServer;
 use crate::report;
 
 /// Level, text and values.

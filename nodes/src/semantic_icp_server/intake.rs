@@ -1,10 +1,18 @@
-//! Input of headset clouds.
+//! Input of the headset: clouds, class names, sessions.
+
+use std::sync::Arc;
 
 use lattice_core::cloud::CloudError;
+use lattice_core::registration::SourceCloud;
+use lattice_msgs::lattice::CalibrationResult;
 use lattice_msgs::sensor_msgs::PointCloud2;
+use lattice_msgs::std_msgs::String as StringMessage;
+use lattice_msgs::vision_msgs::LabelInfo;
 use thiserror::Error;
 
-use super::*;
+use super::jobs::NO_MAP;
+use super::output::Output;
+use super::state::SemanticIcpServer;
 use crate::convert::semantic::{SemanticError, headset_scan_from_message};
 
 /// Reason for rejecting a cloud.
@@ -17,6 +25,34 @@ enum Refusal {
 }
 
 impl SemanticIcpServer {
+    /// Handles the class names of the headset. Other names mean another segmenter, whose label confusions
+    /// are unknown.
+    pub fn on_label_info(&mut self, message: &LabelInfo) {
+        let classes = message.class_map.iter().take(usize::from(u16::MAX));
+        let name = |name: &str| name.chars().take(64).collect();
+        let names = classes
+            .map(|class| (class.class_id, name(&class.class_name)))
+            .collect();
+        if self.names != names {
+            self.names = names;
+            self.reset_label_confusion = true;
+        }
+    }
+
+    /// Handles the headset session: a new session has a new, unknown origin.
+    pub fn on_session(&mut self, message: &StringMessage, now_ns: i64) -> Vec<Output> {
+        let mut out = Vec::new();
+        let session: String = message.data.chars().take(256).collect();
+        if session != self.session {
+            self.counts.sessions += 1;
+            self.reset_label_confusion = true;
+            self.session = session;
+            self.headset_scans.clear();
+            self.forget("the headset has begun a new session", now_ns, &mut out);
+        }
+        out
+    }
+
     /// Handles a headset cloud. An invalid one is reported as a rejection with the reason.
     pub fn on_headset_cloud(&mut self, message: &PointCloud2, now_ns: i64) -> Vec<Output> {
         let mut out = Vec::new();

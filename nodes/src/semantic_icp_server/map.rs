@@ -2,7 +2,8 @@
 
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 
-use super::{Output, SemanticIcpServer};
+use super::output::Output;
+use super::state::SemanticIcpServer;
 use crate::hurry::Hurry;
 use crate::map_follower::{FollowError, Followed};
 
@@ -53,14 +54,5 @@ impl SemanticIcpServer {
     /// Number of detected differences from the mapper's map.
     pub fn map_differences(&self) -> u64 {
         self.follower.differences()
-    }
-
-    /// Number of voxels of the followed map; 0 before its first keyframe.
-    pub fn map_voxels(&self) -> usize {
-        self.follower.map().map_or(0, |map| map.voxels().len())
-    }
-
-    pub(super) fn has_map(&self) -> bool {
-        self.map_voxels() > 0
     }
 }

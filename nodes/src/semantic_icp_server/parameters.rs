@@ -13,7 +13,6 @@ const ABOUT: &[About] = about! {
     "map_frame" fixed(FRAME): "Frame of the map.";
     "headset_frame" fixed(FRAME): "Required frame of the headset's clouds: its origin.";
     "headset_axes" fixed(FRAME): "Axis convention of the clouds: ros_flu (forward, left, up), unity_ruf (right, up, forward; left-handed), winrt_rub (right, up, backward) or optical (right, down, forward). Gravity must be along down.";
-    "max_cloud_points": "Limit of points per cloud; larger clouds are rejected.";
     "max_range_m": "Points farther from the origin of the headset are rejected.";
     "require_labels": "Whether clouds without labels are rejected; otherwise they are registered by geometry only.";
     "max_map_voxels": "Voxel limit of the followed map.";
@@ -65,11 +64,7 @@ impl Settings {
         let rate_hz = params.f64_in("tf_rate_hz", 10.0, 0.1..=100.0)?;
         Ok(Self {
             server: ServerOptions::from_params(params)?,
-            limits: ComputeLimits {
-                events: options::inbox_events(params, 4096)?,
-                bytes: options::inbox_bytes(params, 256 << 20)?,
-                threads: 1,
-            },
+            limits: options::compute_limits(params, 4096, 256 << 20, 1)?,
             search_threads: options::threads(params, 0)?,
             tf_period: Duration::from_secs_f64(1.0 / rate_hz),
             mapper: params.string("mapper", "lattice_mapper")?,

@@ -1,6 +1,17 @@
 //! Results of searches and of tracking.
 
-use super::*;
+use std::sync::Arc;
+
+use lattice_core::registration::{Calibration, TrackUpdate, Verdict};
+use lattice_msgs::geometry_msgs::TransformStamped;
+use lattice_msgs::lattice::CalibrationResult;
+use nalgebra::Isometry3;
+
+use super::output::{CallId, End, Output, answer};
+use super::search::Work;
+use super::state::{CurrentCalibration, Running, SemanticIcpServer};
+use crate::convert::calibration::{result_from, set_pose};
+use crate::convert::geometry;
 
 /// Smaller pose differences are not published, m and rad.
 const SAME_POSE: (f64, f64) = (0.005, 0.002);
@@ -12,6 +23,21 @@ const DOUBT_AGAIN_NS: i64 = 10_000_000_000;
 const PUBLISH_AGAIN_NS: i64 = 5_000_000_000;
 
 impl SemanticIcpServer {
+    /// Repeats the transform for late joiners. To be called regularly.
+    pub fn tick(&mut self, now_ns: i64) -> Option<Output> {
+        let current = self.current.as_ref()?;
+        Some(Output::Transform(self.transform(current, now_ns)))
+    }
+
+    fn transform(&self, current: &CurrentCalibration, now_ns: i64) -> TransformStamped {
+        geometry::transform_stamped(
+            &self.options.map_frame,
+            &self.options.headset_frame,
+            now_ns,
+            &current.map_from_headset,
+        )
+    }
+
     /// Handles the end of a search.
     pub(super) fn searched(
         &mut self,

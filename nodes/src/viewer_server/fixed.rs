@@ -9,11 +9,9 @@ use lattice_msgs::cdr;
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 
-use super::broadcaster::{Broadcaster, entry};
+use super::broadcast::{Broadcaster, Class, entry, thin};
 use super::options::{ViewerOptions, url};
-use super::outbox::Class;
 use super::server::Server;
-use super::thin;
 use crate::convert::map::{History, MapStamp, keyframe};
 use crate::hurry::Hurry;
 

@@ -9,8 +9,8 @@ use async_tungstenite::tungstenite::client::IntoClientRequest;
 use async_tungstenite::tungstenite::{Message, WebSocket, client};
 use rustix::net::sockopt::set_socket_recv_buffer_size;
 
-use super::connection_limit::{MAX_CONNECTIONS, MAX_PER_ADDRESS};
-use super::stream::STALL_TIME;
+use super::server::connection_limit::{MAX_CONNECTIONS, MAX_PER_ADDRESS};
+use super::server::stream::STALL_TIME;
 use super::tests::{connect, data, server, text};
 use super::*;
 

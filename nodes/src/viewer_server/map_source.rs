@@ -10,8 +10,7 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Header;
 use serde_bytes::ByteBuf;
 
-use super::map_stream::Entry;
-use super::thin;
+use super::broadcast::{Entry, thin};
 use crate::convert::map::{History, KEY_ENCODING, VoxelState, sign};
 use crate::hurry::Hurry;
 use crate::map_follower::{FollowError, Followed, FollowedMap, MapFollower};

@@ -10,15 +10,12 @@ use lattice_msgs::tf2_msgs::TFMessage;
 use serde::Serialize;
 
 use super::bridge::{HandOver, HeadsetTopics, NodeBridge};
-use super::broadcaster::Broadcaster;
-use super::counts::BroadcasterCounts;
-use super::inputs::{Input, InputCounts, Inputs, Waiting};
+use super::broadcast::{Broadcaster, BroadcasterCounts, Class, MapStream};
 use super::map_source::{MapChange, MapSource};
-use super::map_stream::MapStream;
 use super::options::{ViewerOptions, url};
-use super::outbox::Class;
 use super::parameters::Settings;
 use super::server::Server;
+use super::session::{Input, InputCounts, Inputs, Waiting};
 use super::sources::{FixedTransforms, FromChannel, Sources, Unwritten};
 use crate::compute::{Compute, Inbox};
 use crate::hurry::Hurry;

@@ -1,8 +1,8 @@
 //! Parameters of the viewer.
 
 use super::bridge::{BridgeOptions, HeadsetLimits};
-use super::offer::MAX_MESSAGE_BYTES;
 use super::options::ViewerOptions;
+use super::session::MAX_MESSAGE_BYTES;
 use crate::compute::ComputeLimits;
 use crate::options::{self, TOPIC};
 use crate::report;
@@ -47,11 +47,7 @@ impl Settings {
         params.describe(options::COMMON);
         Ok(Self {
             viewer: ViewerOptions::from_params(params)?,
-            limits: ComputeLimits {
-                events: options::inbox_events(params, 4096)?,
-                bytes: options::inbox_bytes(params, 64 << 20)?,
-                threads: options::threads(params, 1)?,
-            },
+            limits: options::compute_limits(params, 4096, 64 << 20, options::threads(params, 1)?)?,
             reach: BridgeOptions {
                 allow_write: params.bool("allow_write", false)?,
                 mapper: params.string("mapper", "lattice_mapper")?,

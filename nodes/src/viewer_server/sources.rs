@@ -17,9 +17,8 @@ use lattice_msgs::{RosMessage, cdr};
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Node, RuntimeError, Subscription, SubscriptionExecutor};
 
-use super::broadcaster::{Broadcaster, Demand};
+use super::broadcast::{Broadcaster, Class, Demand};
 use super::options::ViewerOptions;
-use super::outbox::Class;
 use crate::compute::Inbox;
 
 /// Largest forwarded message, bytes.

@@ -14,7 +14,7 @@ use lattice_msgs::std_msgs::Empty;
 use lattice_msgs::tf2_msgs::TFMessage;
 use proptest::prelude::*;
 
-use super::broadcaster::entry;
+use super::broadcast::entry;
 use super::*;
 
 /// A state of a map: a number that updates raise by one.

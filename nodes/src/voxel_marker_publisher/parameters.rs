@@ -17,7 +17,6 @@ const ABOUT: &[About] = about! {
     "block_bits": "Block size: 2^block_bits lattice indices a side; a change republishes its whole block.";
     "chunk_bytes": "Largest message, bytes.";
     "max_marker_voxels": "Voxel count above which maps are drawn as points.";
-    "max_voxels": "Voxel limit of the followed map.";
     "rate_hz": "Rate of publishing changes.";
     "max_bytes_per_s": "Limit of published bytes per second.";
 };
@@ -44,11 +43,7 @@ impl Settings {
         // Two consecutive arrays exceed the size of one, so these fit into the history and the queue.
         let most_bytes = Qos::MARKERS.depth / 2 * markers.chunk_bytes;
         Ok(Self {
-            limits: ComputeLimits {
-                events: options::inbox_events(params, 4096)?,
-                bytes: options::inbox_bytes(params, 64 << 20)?,
-                threads: options::threads(params, 1)?,
-            },
+            limits: options::compute_limits(params, 4096, 64 << 20, options::threads(params, 1)?)?,
             period: Duration::from_secs_f64(1.0 / rate_hz),
             budget_bytes: ((bytes_per_s as f64 / rate_hz) as usize).min(most_bytes),
             markers,

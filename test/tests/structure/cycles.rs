@@ -331,7 +331,7 @@ fn file_of(source: &Path, module: &[String]) -> std::path::PathBuf {
 const CRATES: [(&str, usize); 7] = [
     ("msgs/src", 0),
     ("lattice_core/src", 4),
-    ("nodes/src", 118),
+    ("nodes/src", 0),
     ("nodes/runtime/src", 0),
     ("nodes/bag/src", 0),
     ("nodes/lab/src", 75),

@@ -14,7 +14,7 @@ fn quoted(line: &str) -> Vec<&str> {
 
 /// True for a file or folder of the repository by its name; a file that each node has goes without one.
 fn is_path(text: &str) -> bool {
-    let of_each_node = ["mod.rs", "node.rs", "options.rs", "parameters.rs"];
+    let of_each_node = ["machine.rs", "node.rs", "options.rs", "parameters.rs"];
     if of_each_node.contains(&text) {
         return false;
     }

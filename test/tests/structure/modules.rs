@@ -8,7 +8,7 @@ use super::root;
 use super::source::{code, files, module};
 
 /// Modules of crates and of folders in layers: each may use those before it in the list.
-const LAYERS: [(&str, &str); 8] = [
+const LAYERS: [(&str, &str); 26] = [
     (
         "lattice_core/src",
         "prefetch lattice kd_tree cloud geodesy pose voxels query raycast navigation registration odometry loop_closure",
@@ -17,6 +17,80 @@ const LAYERS: [(&str, &str); 8] = [
         "nodes/src",
         "hurry octree files convert mesh stamps start report compute options cloud_input map_follower map_input map_output camera segmenter semantic_cloud headset_cloud enu_transformer lidar_odometry lattice_mapper map_merger map_projector \
          voxel_marker_publisher semantic_icp_server viewer_server replay running executables bag_player bag_recorder",
+    ),
+    (
+        "nodes/src/bag_player",
+        "commands parameters player_report playhead steps lockstep playback controls keyboard waiting",
+    ),
+    (
+        "nodes/src/bag_recorder",
+        "cache choice definitions offered session controls writing",
+    ),
+    (
+        "nodes/src/camera",
+        "camera_error distortion image palette labels pinhole point_layout soft pixels points",
+    ),
+    (
+        "nodes/src/cloud_input",
+        "error records channels livox scan cloud_type subscription",
+    ),
+    (
+        "nodes/src/enu_transformer",
+        "cloud_clocks cloud_notes cloud_times ins_options options parameters attitude refusals counts body_pose reference samples speed_gate stamp_order ins_refusal fixes ins link_orders waiting \
+         state transforms body_mounts drops verdict sampling placing pose_intake pose_frames machine tf_intake node",
+    ),
+    (
+        "nodes/src/files/points",
+        "format error collect label scalar bin_layout source e57 kitti las octree detect text pcd ply",
+    ),
+    (
+        "nodes/src/headset_cloud",
+        "counts marker refusal session chunks surfaces view options parameters poses waiting machine meshes node",
+    ),
+    (
+        "nodes/src/lattice_mapper",
+        "counts free_options options free_space occupancy map_folder outputs refusal state datum machine map_messages octree operations corrected report \
+         plan call octomap services autosave parameters unmapped compute_state status node",
+    ),
+    (
+        "nodes/src/lidar_odometry",
+        "counts motions options machine live_loops loops parameters path node",
+    ),
+    (
+        "nodes/src/map_follower",
+        "followed followed_map incomplete follower keyframe",
+    ),
+    (
+        "nodes/src/map_merger",
+        "options parameters robot_map machine node",
+    ),
+    (
+        "nodes/src/map_projector",
+        "changes messages options parameters robot window machine node",
+    ),
+    (
+        "nodes/src/replay",
+        "packets camera_input topics disorder slice survey images cameras topic_plan poses statics plan camera_report depth_clouds scan_poses report pipeline mount_samples",
+    ),
+    (
+        "nodes/src/segmenter",
+        "checks counts jpeg network colors compressed labels options machine regular_file names file sizes onnx_runtime tract backends parameters worker inside node",
+    ),
+    (
+        "nodes/src/semantic_cloud",
+        "compressed counts network project waiting options machine parameters node",
+    ),
+    (
+        "nodes/src/semantic_icp_server",
+        "counts headset_scans options parameters search output state jobs map intake results machine diagnosis outputs search_thread node",
+    ),
+    (
+        "nodes/src/viewer_server",
+        "protocol session broadcast bridge http server options parameters map_source fixed sources node hostile_tests pause_tests",
+    ),
+    (
+        "nodes/src/voxel_marker_publisher",
+        "blocks color options packer parameters shape machine node",
     ),
     (
         "nodes/runtime/src",

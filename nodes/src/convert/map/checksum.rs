@@ -4,7 +4,7 @@
 use lattice_core::lattice::MortonKey;
 use lattice_msgs::lattice::LatticeMapUpdate;
 
-use super::{VoxelColumns, VoxelState, keys_from, voxels_from};
+use super::voxels::{VoxelColumns, VoxelState, keys_from, voxels_from};
 
 /// Checksum of all updates up to a state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

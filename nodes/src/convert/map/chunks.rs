@@ -6,8 +6,9 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use nalgebra::Vector3;
 use serde_bytes::ByteBuf;
 
+use super::error::KEY_ENCODING;
+use super::lattice_info::{MapStamp, info_of};
 use super::voxels::labels_of;
-use super::{KEY_ENCODING, MapStamp, info_of};
 
 /// Upper bound of a chunk's bytes besides voxels: header, info, lengths.
 const CHUNK_OVERHEAD_BYTES: usize = 1024;

@@ -1,150 +1,16 @@
 //! Conversion of voxel lists to `LatticeMap` keyframes and `LatticeMapUpdate` deltas of bounded size.
 
-use lattice_core::lattice::{Lattice, LatticeKind};
-use lattice_core::voxels::codec;
-use lattice_msgs::geographic_msgs::GeoPoint;
-use lattice_msgs::lattice::LatticeInfo;
-use lattice_msgs::std_msgs::Header;
-use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use thiserror::Error;
-
 mod checksum;
 mod chunks;
+mod error;
+mod lattice_info;
 mod voxels;
 
 pub use checksum::{History, changes_sum, sign};
 pub use chunks::{keyframe, keyframe_of_cells, update, update_of_cells, voxel_bytes};
+pub use error::{KEY_ENCODING, MapMessageError};
+pub use lattice_info::{MapStamp, info_of, lattice_from};
 pub use voxels::{VoxelColumns, VoxelState, keys_from, main_label, voxels_from};
-
-use super::geometry;
-use crate::hurry::Hurry;
-
-/// Supported key encoding: Morton-sorted 21-bit indices, LEB128 varints of differences.
-pub const KEY_ENCODING: &str = "morton21_delta_leb128";
-
-/// Relative tolerance of generator, cell volume and quaternion.
-const TOLERANCE: f64 = 1e-9;
-
-/// Reason for rejecting a `LatticeMap` or `LatticeMapUpdate`.
-#[derive(Debug, Error)]
-pub enum MapMessageError {
-    /// Invalid lattice or cell volume.
-    #[error("lattice '{lattice}' with cell volume {cell_volume_m3} m^3: {reason}")]
-    Lattice {
-        /// Name as sent.
-        lattice: String,
-        /// Cell volume as sent.
-        cell_volume_m3: f64,
-        /// Fault of the lattice or the volume.
-        reason: String,
-    },
-    /// Unsupported key encoding.
-    #[error("key encoding '{0}' is unknown, expected '{KEY_ENCODING}'")]
-    Encoding(String),
-    /// Invalid keys.
-    #[error("voxel keys: {0}")]
-    Keys(#[from] codec::CodecError),
-    /// Column length that does not match the keys.
-    #[error("{column} has {found} entries for {voxels} voxels, expected {expected}")]
-    Length {
-        /// Name of the column.
-        column: &'static str,
-        /// Number of keys.
-        voxels: usize,
-        /// Expected number of entries.
-        expected: usize,
-        /// Number of entries.
-        found: usize,
-    },
-    /// Chunk index outside the number of chunks.
-    #[error("chunk {chunk} of {chunks}")]
-    Chunk {
-        /// Number of the chunk in the message, from 0.
-        chunk: u32,
-        /// Number of chunks in the message.
-        chunks: u32,
-    },
-    /// Invalid lattice frame.
-    #[error("map_from_lattice is not a pose: a number is not finite or the rotation is zero")]
-    Frame,
-}
-
-/// Header and state common to all messages of one map state.
-pub struct MapStamp<'a> {
-    /// Frame and time.
-    pub header: Header,
-    /// Epoch; it changes when the map is reset.
-    pub epoch: u64,
-    /// Sequence number of the state.
-    pub sequence: u64,
-    /// Checksum of the updates up to the state.
-    pub history: History,
-    /// Geodetic origin of the map frame, if known.
-    pub origin: Option<&'a GeoPoint>,
-    /// Largest serialized chunk, bytes.
-    pub chunk_bytes: usize,
-    /// Request to leave a keyframe out.
-    pub hurry: Hurry,
-}
-
-/// Lattice, its frame and the epoch as a message: the generator is in the
-/// lattice's own axes, which `map_from_lattice` rotates.
-pub fn info_of(lattice: &Lattice, datum_m: Vector3<f64>, stamp: &MapStamp) -> LatticeInfo {
-    let g = lattice.unoriented_generator().transpose();
-    let mut generator = [0.0; 9];
-    generator.copy_from_slice(g.as_slice());
-    let datum = Isometry3::from_parts(Translation3::from(datum_m), lattice.orientation());
-    LatticeInfo {
-        lattice: lattice.kind().name().to_owned(),
-        cell_volume_m3: lattice.cell_volume_m3(),
-        generator,
-        map_from_lattice: geometry::pose_from(&datum),
-        origin: stamp.origin.copied().unwrap_or_default(),
-        has_origin: stamp.origin.is_some(),
-        epoch: stamp.epoch,
-    }
-}
-
-/// Lattice of a message, rotated into the map frame, and its datum in that frame.
-///
-/// Rejected if generator, name and cell volume disagree; a custom lattice is that of its generator.
-pub fn lattice_from(info: &LatticeInfo) -> Result<(Lattice, Vector3<f64>), MapMessageError> {
-    let refuse = |reason: String| MapMessageError::Lattice {
-        lattice: info.lattice.chars().take(32).collect(),
-        cell_volume_m3: info.cell_volume_m3,
-        reason,
-    };
-    let generator = Matrix3::from_row_slice(&info.generator);
-    let lattice = if info.lattice == LatticeKind::Custom.name() {
-        Lattice::from_basis(generator)
-    } else {
-        let kind = info.lattice.parse::<LatticeKind>();
-        kind.and_then(|kind| Lattice::new(kind, info.cell_volume_m3))
-    };
-    let lattice = lattice.map_err(|e| refuse(format!("{e}")))?;
-    let volume_m3 = lattice.cell_volume_m3();
-    let volume_off = (info.cell_volume_m3 - volume_m3).abs() / volume_m3;
-    let generator_off = (generator - lattice.unoriented_generator()).abs().sum();
-    let agrees = volume_off <= TOLERANCE && generator_off <= TOLERANCE * lattice.cell_side_m();
-    if !agrees {
-        let expected = lattice.unoriented_generator();
-        return Err(refuse(format!(
-            "generator and volume are not those of the lattice, {:?} row by row and {volume_m3} m^3",
-            expected.transpose().as_slice()
-        )));
-    }
-    let place =
-        geometry::isometry_from_pose(&info.map_from_lattice).ok_or(MapMessageError::Frame)?;
-    let q = &info.map_from_lattice.orientation;
-    let sent = Quaternion::new(q.w, q.x, q.y, q.z);
-    // Bit-exact as sent, if its norm is 1 within rounding.
-    let rotation = if (sent.norm_squared() - 1.0).abs() <= TOLERANCE {
-        UnitQuaternion::new_unchecked(sent)
-    } else {
-        place.rotation
-    };
-    Ok((lattice.oriented(rotation), place.translation.vector))
-}
 
 #[cfg(test)]
 mod tests;

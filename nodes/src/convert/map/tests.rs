@@ -1,6 +1,11 @@
+use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::voxels::VoxelList;
+use lattice_msgs::lattice::LatticeInfo;
+use lattice_msgs::std_msgs::Header;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::*;
+use crate::hurry::Hurry;
 
 fn list(lattice: &Lattice) -> VoxelList {
     VoxelList::new(lattice.clone(), Vector3::new(100.0, -50.0, 3.0), 10).unwrap()

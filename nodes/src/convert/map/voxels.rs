@@ -5,7 +5,7 @@ use lattice_core::registration::UNLABELED;
 use lattice_core::voxels::{VoxelList, codec};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 
-use super::{KEY_ENCODING, MapMessageError};
+use super::error::{KEY_ENCODING, MapMessageError};
 
 /// Voxel as a consumer receives it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,7 +4,8 @@ use std::io::Write;
 
 use lattice_core::voxels::VoxelList;
 
-use super::{ExportError, comment, ply_header};
+use super::error::ExportError;
+use super::ply_header::{comment, ply_header};
 
 /// Writes the occupied cells in Morton order as vertices of a binary PLY file.
 ///

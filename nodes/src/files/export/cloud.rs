@@ -4,7 +4,7 @@ use std::io::{self, BufWriter, Write};
 
 use nalgebra::Point3;
 
-use super::ply_header;
+use super::ply_header::ply_header;
 
 /// Writes points as vertices of a binary PLY file: `x`, `y`, `z` (double, metres) and `label`
 /// (ushort, 65535 for none, also for points beyond the labels). `comment` is one line that names

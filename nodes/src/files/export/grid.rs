@@ -4,7 +4,7 @@ use std::io::Write;
 
 use lattice_core::navigation::{Cell, Grid};
 
-use super::ExportError;
+use super::error::ExportError;
 
 /// Grey value of a cell in the mode trinary.
 fn grey(cell: Cell) -> u8 {

@@ -7,8 +7,10 @@ use lattice_core::voxels::VoxelList;
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap;
 
+use super::error::ExportError;
+use super::palette::{HeightRange, color_at};
+use super::ply_header::{comment, ply_header};
 use super::vertices::SharedVertices;
-use super::{ExportError, HeightRange, color_at, comment, ply_header};
 
 /// Writes the faces between occupied and empty cells as a binary PLY mesh of convex polygons.
 ///

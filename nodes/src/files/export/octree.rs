@@ -5,7 +5,8 @@ use std::io::{BufWriter, Write};
 use lattice_core::lattice::MortonKey;
 use lattice_core::voxels::VoxelList;
 
-use super::ExportError;
+use super::error::ExportError;
+use super::ply_header::comment;
 use crate::octree::{CLASS, LOG_ODDS_OCCUPIED, OctreeForm, OctreeVoxels, UNKNOWN};
 
 /// Size of a written tree.
@@ -47,7 +48,7 @@ pub fn write_octree(
         writer,
         "# Octomap OcTree{kind} file\n# (feel free to add / change comments, but leave the first line as it is!)\n\
          # {}\nid {CLASS}\nsize {}\nres {resolution_m}\ndata\n",
-        super::comment(list),
+        comment(list),
         tree.nodes,
     )?;
     writer.write_all(&tree.data)?;

@@ -5,7 +5,8 @@ use std::io::{BufWriter, Write};
 use lattice_core::registration::UNLABELED;
 use lattice_core::voxels::VoxelList;
 
-use super::ExportError;
+use super::error::ExportError;
+use super::ply_header::comment;
 
 /// Coordinates below this are written in single precision, with an error below 0.5 mm, m.
 const SINGLE_M: f64 = 8192.0;
@@ -28,7 +29,7 @@ pub fn write_centers_pcd(list: &VoxelList, writer: impl Write) -> Result<(), Exp
         "# .PCD v0.7 - Point Cloud Data file format\n# {}\nVERSION 0.7\nFIELDS x y z intensity{}\n\
          SIZE {size} {size} {size} 4{}\nTYPE F F F F{}\nCOUNT 1 1 1 1{}\nWIDTH {points}\nHEIGHT 1\n\
          VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {points}\nDATA binary\n",
-        super::comment(list),
+        comment(list),
         label(" label"),
         label(" 4"),
         label(" U"),

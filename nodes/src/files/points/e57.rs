@@ -8,7 +8,9 @@ use std::path::Path;
 use ::e57::{CartesianCoordinate, E57Reader};
 
 use super::collect::Collector;
-use super::{BUFFER, PointFileError, PointFormat};
+use super::error::PointFileError;
+use super::format::PointFormat;
+use super::source::BUFFER;
 
 /// Reads all scans of a file; points marked invalid are skipped and counted.
 pub(super) fn read(path: &Path, points: &mut Collector) -> Result<PointFormat, PointFileError> {

@@ -4,7 +4,7 @@ use std::io;
 
 use thiserror::Error;
 
-use super::PointFormat;
+use super::format::PointFormat;
 
 /// Reason for rejecting a point file. Bytes count from 0, lines from 1, both after decompression.
 #[derive(Debug, Error)]

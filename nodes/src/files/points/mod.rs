@@ -7,6 +7,7 @@
 
 mod bin_layout;
 mod collect;
+mod detect;
 #[cfg(feature = "survey")]
 mod e57;
 mod error;
@@ -26,14 +27,13 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 pub use bin_layout::BinLayout;
+pub use detect::is_named_as_points;
 pub use error::PointFileError;
-pub use format::{PointFormat, is_named_as_points};
+pub use format::PointFormat;
 
 use collect::Collector;
-use source::Source;
-
-/// Read buffer, bytes.
-const BUFFER: usize = 1 << 16;
+use detect::Family;
+use source::{BUFFER, Source};
 
 /// Options for reading a point file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -83,18 +83,18 @@ pub fn read_points(path: &Path, options: &PointFileOptions) -> Result<PointFile,
     let mut voxel_m = None;
     // LAZ and E57 need random access.
     let file = (!is_packed).then_some(path);
-    let format = match format::detect(source.peek()?, &name)? {
-        format::Family::Ply => ply::read(&mut source, &mut points)?,
-        format::Family::Pcd => pcd::read(&mut source, &mut points)?,
-        format::Family::Text => text::read(&mut source, &mut points)?,
-        format::Family::Kitti => {
+    let format = match detect::detect(source.peek()?, &name)? {
+        Family::Ply => ply::read(&mut source, &mut points)?,
+        Family::Pcd => pcd::read(&mut source, &mut points)?,
+        Family::Text => text::read(&mut source, &mut points)?,
+        Family::Kitti => {
             let size_bytes = file.and_then(|file| file.metadata().ok());
             let named = (name.as_path(), size_bytes.map(|about| about.len()));
             kitti::read(&mut source, named, options.columns, &mut points)?
         }
-        format::Family::Las => las::read(&mut source, file, &mut points)?,
-        format::Family::E57 => read_e57(file, &mut points)?,
-        format::Family::Octree => {
+        Family::Las => las::read(&mut source, file, &mut points)?,
+        Family::E57 => read_e57(file, &mut points)?,
+        Family::Octree => {
             let (format, edge_m) = octree::read(&mut source, &mut points)?;
             voxel_m = Some(edge_m);
             format
@@ -147,8 +147,8 @@ fn unpack(path: &Path) -> Result<(Box<dyn BufRead>, PathBuf, bool), PointFileErr
     let io = |source| PointFileError::Io { byte: 0, source };
     let mut packed = BufReader::with_capacity(BUFFER, File::open(path).map_err(io)?);
     let start = packed.fill_buf().map_err(io)?;
-    if !format::is_bzip2(start) {
-        if let Some(byte) = format::cut_bzip2(start) {
+    if !detect::is_bzip2(start) {
+        if let Some(byte) = detect::cut_bzip2(start) {
             let part = "its packed data".to_owned();
             return Err(PointFileError::Truncated { byte, part });
         }

@@ -4,8 +4,10 @@ use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, BufRead, Read};
 
-use super::PointFileError;
+use super::error::PointFileError;
 
+/// Read buffer, bytes.
+pub(super) const BUFFER: usize = 1 << 16;
 /// Longest line, bytes.
 const MAX_LINE: u64 = 1 << 20;
 

@@ -17,7 +17,8 @@ use nalgebra::{Isometry3, Vector3};
 
 pub use self::counts::CorrectionCounts;
 use self::kept_cloud::{KeptCloud, SeenCells, Thinned};
-use super::{CloudRefusal, LatticeMapper};
+use super::refusal::CloudRefusal;
+use super::state::LatticeMapper;
 use crate::convert::corrections::{CorrectionsError, PlacedCorrections};
 
 /// Edge of the cubes that keep one point each, in cell sizes.

@@ -10,8 +10,7 @@ use lattice_runtime::qos::Qos;
 use lattice_runtime::{Node, PublishError, Publisher, RuntimeError};
 
 use super::mesh_chunks::in_chunks;
-use crate::viewer_server::inputs::{Input, InputRefusal};
-use crate::viewer_server::offer::OpenTopic;
+use crate::viewer_server::session::{Input, InputRefusal, OpenTopic};
 
 /// Decodes and publishes a message.
 type Pass = Box<dyn Fn(&Input) -> Result<(), InputRefusal> + Send>;

@@ -3,7 +3,7 @@
 use lattice_msgs::lattice::HeadsetMesh;
 
 use crate::convert::headset_mesh::{self, chunks_for};
-use crate::viewer_server::inputs::InputRefusal;
+use crate::viewer_server::session::InputRefusal;
 
 /// Limit of bytes of session, surface and frame names, which every chunk repeats.
 const NAMES_BYTES: usize = 2_000;

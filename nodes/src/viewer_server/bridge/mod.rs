@@ -3,77 +3,32 @@
 
 mod headset;
 mod mesh_chunks;
+mod options;
 mod parameters;
+mod replies;
 mod services;
 mod values;
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use futures::future::BoxFuture;
 use lattice_msgs::RosMessage;
 use lattice_msgs::geometry_msgs::PoseStamped;
 use lattice_msgs::rcl_interfaces::ParameterEvent;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{CallError, Node, Publisher, Subscription, SubscriptionExecutor};
+use lattice_runtime::{Node, Publisher, Subscription, SubscriptionExecutor};
 
 pub use self::headset::HeadsetTopics;
+pub use self::options::{BridgeOptions, HeadsetLimits};
 use self::parameters::Parameters;
-use super::broadcaster::Broadcaster;
-use super::client_session::BridgeRequest;
-use super::inputs::{Input, InputRefusal, Inputs};
-use super::offer::{Offer, OpenTopic};
-use super::outbox::Outgoing;
+use self::replies::words;
+use super::broadcast::{Bridge, Broadcaster, Outgoing};
 use super::protocol::{parameter_values, service_failure, service_response, status};
+use super::session::{BridgeRequest, Input, InputRefusal, Inputs, Offer, OpenTopic};
 use crate::start::NodeError;
 
-/// Timeout of a node's reply.
-const PATIENCE: Duration = Duration::from_secs(5);
 /// Largest forwarded reply, and largest client message, bytes.
 const MAX_ANSWER_BYTES: usize = 1 << 20;
-
-/// Executes requests of clients.
-pub trait Bridge: Send + Sync {
-    /// Capabilities offered to clients.
-    fn offer(&self) -> &Offer;
-
-    /// Executes a request; returns messages for the client. Dropping the future cancels it.
-    fn request(&self, request: BridgeRequest) -> BoxFuture<'static, Vec<Outgoing>>;
-
-    /// Queues a client's message for a headset topic without blocking, or returns the reason for its rejection.
-    fn take(&self, client: u64, input: Input) -> Result<(), InputRefusal>;
-
-    /// Counters of headset messages.
-    fn inputs(&self) -> &Inputs;
-}
-
-/// Nodes accessible to clients.
-#[derive(Clone, Debug)]
-pub struct BridgeOptions {
-    /// True if clients may change state.
-    pub allow_write: bool,
-    /// Name of the mapper.
-    pub mapper: String,
-    /// Name of the bag player.
-    pub player: String,
-    /// Nodes whose parameters are accessible.
-    pub parameter_nodes: Vec<String>,
-    /// Topic of goals (`geometry_msgs/PoseStamped`).
-    pub goal_topic: String,
-    /// Limits of headset messages from clients; `None`: not allowed.
-    pub headset: Option<HeadsetLimits>,
-}
-
-/// Limits of headset messages from clients.
-#[derive(Clone, Debug)]
-pub struct HeadsetLimits {
-    /// Longest message, bytes.
-    pub message_bytes: usize,
-    /// Rate limit per client, bytes per second.
-    pub bytes_per_s: usize,
-    /// Name of the calibration node.
-    pub calibrator: String,
-}
 
 /// Sends a client's message to the node's thread; false if the inbox is full.
 pub type HandOver = Box<dyn Fn(u64, Input) -> bool + Send + Sync>;
@@ -227,16 +182,4 @@ fn told(outcome: parameters::Outcome, id: Option<String>) -> Vec<Outgoing> {
     let problems = outcome.problems.iter().map(|why| status(why));
     let values = parameter_values(&outcome.values, id.as_deref());
     problems.chain([values]).map(Outgoing::Text).collect()
-}
-
-fn words(error: impl ToString) -> String {
-    error.to_string()
-}
-
-/// Decoded reply of a call.
-async fn answer<M: RosMessage>(
-    call: impl Future<Output = Result<Vec<u8>, CallError>>,
-) -> Result<M, String> {
-    let cdr = call.await.map_err(words)?;
-    lattice_msgs::cdr::from_slice(&cdr).map_err(words)
 }

@@ -10,8 +10,8 @@ use lattice_msgs::rcl_interfaces::{
 };
 use lattice_runtime::{CallError, Client, Node, RuntimeError};
 
+use super::replies::{PATIENCE, answer};
 use super::values::{from_json, to_json};
-use super::{PATIENCE, answer};
 use crate::viewer_server::protocol::Value;
 
 /// Limit of parameters requested per node.

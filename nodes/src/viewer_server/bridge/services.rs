@@ -10,7 +10,8 @@ use lattice_msgs::std_srvs::Trigger;
 use lattice_msgs::{RosMessage, RosService};
 use lattice_runtime::{Client, Node, RuntimeError};
 
-use super::{BridgeOptions, PATIENCE};
+use super::options::BridgeOptions;
+use super::replies::PATIENCE;
 use crate::viewer_server::protocol::AdvertisedService;
 
 /// Timeout of a calibration, which may include a search.

@@ -5,6 +5,8 @@ use crate::files::points::scalar::Scalar;
 use crate::files::points::source::Source;
 use crate::files::points::{PointFileError, PointFormat};
 
+/// First bytes of every file.
+pub(in crate::files::points) const SIGNATURE: &[u8] = b"LASF";
 /// Length of the shortest header, that of version 1.0, bytes.
 const MIN_HEADER: u16 = 227;
 /// Length of the longest accepted header, bytes.
@@ -44,7 +46,7 @@ impl Header {
     pub(super) fn read(source: &mut Source) -> Result<Header, PointFileError> {
         let mut bytes = vec![0; usize::from(MIN_HEADER)];
         source.exact(&mut bytes, "the header")?;
-        if !bytes.starts_with(super::SIGNATURE) {
+        if !bytes.starts_with(SIGNATURE) {
             return Err(fault(
                 source,
                 "no `LASF` at the start of the file".to_owned(),

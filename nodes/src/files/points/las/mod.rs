@@ -15,8 +15,7 @@ use super::source::Source;
 use super::{PointFileError, PointFormat};
 use header::Header;
 
-/// First bytes of every file.
-pub(super) const SIGNATURE: &[u8] = b"LASF";
+pub(super) use header::SIGNATURE;
 
 /// Reads the points, with their classification as labels; `file` is the uncompressed input, if any.
 pub(super) fn read(

@@ -2,9 +2,10 @@
 
 use std::sync::atomic::Ordering;
 
-use super::{ComputeState, NO_VIEWPOINTS};
-use crate::lattice_mapper::octomap::Octomaps;
-use crate::lattice_mapper::{CorrectedDrive, MapperReport};
+use super::compute_state::{ComputeState, NO_VIEWPOINTS};
+use super::corrected::CorrectedDrive;
+use super::octomap::Octomaps;
+use super::report::MapperReport;
 use crate::report;
 use lattice_runtime::{Level, WORKING};
 

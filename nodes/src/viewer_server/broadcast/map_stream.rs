@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// A map message.
 #[derive(Clone, Debug, PartialEq)]
@@ -199,5 +200,15 @@ impl MapStream {
         let since = self.updates.iter().skip(index);
         let since: usize = since.map(Entry::bytes).sum();
         (since <= keyframe.bytes.max(FEW_BYTES)).then_some(keyframe)
+    }
+}
+
+/// Stream entry of a message, stamped now.
+pub fn entry(cdr: Vec<u8>) -> Entry {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    Entry {
+        stamp_ns: since.map_or(0, |since| since.as_nanos() as u64),
+        cdr: cdr.into(),
+        thin: None,
     }
 }

@@ -16,16 +16,17 @@ use smol::channel::Receiver;
 use smol::future::{or, pending, poll_once, yield_now};
 use smol::{Async, Timer};
 
-use super::broadcaster::Broadcaster;
-use super::client_session::{ClientSession, SessionAction};
 use super::connection_limit::ConnectionLimit;
-use super::http::{Decision, Head, HeadError, MAX_HEAD_BYTES, RequestAuth, Response};
-use super::inputs::{Input, InputRefusal};
-use super::offer::{MAX_MESSAGE_BYTES, MESSAGE_HEAD_BYTES};
-use super::outbox::Outgoing;
-use super::protocol::message_data;
 use super::rate_limit::RateLimit;
 use super::stream::{ClientStream, Progress};
+use crate::viewer_server::broadcast::{Broadcaster, Outgoing};
+use crate::viewer_server::http::{
+    Decision, Head, HeadError, MAX_HEAD_BYTES, RequestAuth, Response,
+};
+use crate::viewer_server::protocol::message_data;
+use crate::viewer_server::session::{
+    ClientSession, Input, InputRefusal, MAX_MESSAGE_BYTES, MESSAGE_HEAD_BYTES, SessionAction,
+};
 
 /// Timeout of receiving a request.
 const HEAD_TIME: Duration = Duration::from_secs(5);

@@ -1,6 +1,6 @@
 //! Capabilities offered to clients.
 
-use super::protocol::AdvertisedService;
+use crate::viewer_server::protocol::AdvertisedService;
 
 /// Largest client message on topics without their own limit, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 64 << 10;

@@ -1,5 +1,10 @@
 //! Server thread: accepts connections until it is finished.
 
+mod connection;
+pub(super) mod connection_limit;
+mod rate_limit;
+pub(super) mod stream;
+
 use std::io;
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::rc::Rc;
@@ -11,8 +16,8 @@ use lattice_runtime::logging::Throttle;
 use smol::channel::{Sender, bounded};
 use smol::{Async, LocalExecutor, Timer};
 
-use super::broadcaster::Broadcaster;
-use super::connection::{self, ConnectionLimits};
+use self::connection::ConnectionLimits;
+use super::broadcast::Broadcaster;
 use super::http::RequestAuth;
 
 /// Time for clients to read the last messages.

@@ -5,10 +5,10 @@ use std::time::Duration;
 use lattice_runtime::logging::Throttle;
 use smol::channel::Sender;
 
-use super::inputs::InputRefusal;
 use super::outbox::{Outbox, Outgoing};
-use super::protocol::status;
 use super::watched::Watched;
+use crate::viewer_server::protocol::status;
+use crate::viewer_server::session::InputRefusal;
 
 /// Period of rejection notices to a client.
 const WORDS_PERIOD: Duration = Duration::from_secs(1);

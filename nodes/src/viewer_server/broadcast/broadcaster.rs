@@ -13,11 +13,10 @@ use super::bridge::Bridge;
 use super::client::Client;
 use super::counts::BroadcasterCounts;
 use super::graph::ConnectionGraph;
-use super::inputs::InputRefusal;
-use super::map_stream::{Entry, MapStream};
-use super::offer::Offer;
+use super::map_stream::{Entry, MapStream, entry};
 use super::outbox::{Class, Outbox, Outgoing};
-use super::protocol::{self, Advertised, Value};
+use crate::viewer_server::protocol::{self, Advertised, Value};
+use crate::viewer_server::session::{InputRefusal, Offer};
 
 /// Limit of map update bytes kept for slow clients.
 const MAX_UPDATE_BYTES: usize = 8 << 20;
@@ -373,15 +372,5 @@ impl Broadcaster {
         if let Some(last) = &channel.last {
             outbox.offer(channel_id, last);
         }
-    }
-}
-
-/// Stream entry of a message, stamped now.
-pub fn entry(cdr: Vec<u8>) -> Entry {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    Entry {
-        stamp_ns: since.map_or(0, |since| since.as_nanos() as u64),
-        cdr: cdr.into(),
-        thin: None,
     }
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use lattice_runtime::{GraphEndpoint, GraphRole};
 
-use super::protocol::{GraphUpdate, connection_graph_update};
+use crate::viewer_server::protocol::{GraphUpdate, connection_graph_update};
 
 /// Limit of name bytes in a graph; further endpoints are omitted.
 const MAX_BYTES: usize = 256 << 10;

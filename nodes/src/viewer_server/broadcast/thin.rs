@@ -5,8 +5,7 @@ use lattice_msgs::RosMessage;
 use lattice_msgs::cdr::{self, CdrError};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 
-use super::broadcaster::entry;
-use super::map_stream::Entry;
+use super::map_stream::{Entry, entry};
 
 /// Name of the encoding: `keys` contains the Morton keys, then the counts in the same order as LEB128.
 pub const ENCODING: &str = "morton21_delta_leb128_counts_leb128";
