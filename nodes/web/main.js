@@ -110,7 +110,7 @@ const handlers = {
   },
   transforms({ transforms: come, fixed }) {
     transforms.add(come);
-    mixed.heard(come);
+    mixed.confirm(come);
     if (!fixed) player.heard(come.at(-1)?.stamp);
     const robot = transforms.find(state.frame, ROBOT);
     if (robot) {

@@ -51,6 +51,7 @@ export class MixedReality {
 
   async toggle() {
     if (this.session) return this.session.end();
+    by("said").textContent = "";
     if (!this.services.find("calibrate")) throw new Error("the robot accepts no headset: set allow_headset of viewer_server");
     const agreed = await askFirst({ title: "Mixed reality", text: CONSENT, action: "Agree and start" });
     if (!agreed) return null;
@@ -58,7 +59,8 @@ export class MixedReality {
     try {
       await this.begin(session);
     } catch (error) {
-      await session.end();
+      await session.end().catch(() => null);
+      this.ended();
       throw error;
     }
     return null;
@@ -74,31 +76,35 @@ export class MixedReality {
     const topic = this.state.channels.find(({ kind }) => kind === "calibration")?.topic ?? "/calibration";
     const prefix = topic.slice(0, -"calibration".length);
     const publish = (name, schemaName, bytes) => this.worker.postMessage({ type: "publish", topic: `${prefix}headset/${name}`, schemaName, bytes });
-    publish("labels/label_info", "vision_msgs/msg/LabelInfo", labelNames(FRAME));
+    this.announce = () => publish("labels/label_info", "vision_msgs/msg/LabelInfo", labelNames(FRAME));
     this.sender = new SurfaceSender({ frame: FRAME, publish: (bytes) => publish("mesh", "lattice_msgs/msg/HeadsetMesh", bytes) });
     this.session = session;
     this.restart();
     this.beganAt = performance.now();
     this.button.textContent = "End mixed reality";
-    this.reference.addEventListener("reset", () => this.reset());
+    this.reference.addEventListener("reset", ({ transform }) => this.recentred(transform));
     session.addEventListener("end", () => this.ended());
     session.requestAnimationFrame((time, frame) => this.frame(frame));
   }
 
-  // Forgets the answers of the robot; what is drawn fades where it is.
+  // Begins with the robot; a map that is drawn fades where it is.
   restart() {
+    this.announce();
+    this.sender.begin();
     Object.assign(this, { asking: false, askedAt: -Infinity, answeredAt: -Infinity, isOk: false, verdict: 0, reason: "", changedAt: performance.now(), lookedAt: -Infinity });
   }
 
-  // The user has recentred: the origin is another.
-  reset() {
-    this.sender.begin();
+  // The user has recentred: the origin is another, with a transform if the device knows it.
+  recentred(transform) {
+    const { position: p, orientation: o } = transform ?? {};
+    if (this.pose && transform) this.pose = compose(this.pose, { position: [p.x, p.y, p.z], rotation: [o.x, o.y, o.z, o.w] });
+    else this.opacity = 0;
     this.restart();
   }
 
   // A robot that has started again, or a connection that has been made again.
   connected() {
-    if (this.session) this.reset();
+    if (this.session) this.restart();
   }
 
   ended() {
@@ -119,7 +125,8 @@ export class MixedReality {
     if (mine && verdict === OK) {
       const fromMap = this.transforms().find(this.state.frame, header.frame);
       const place = { position, rotation };
-      const known = header.frame === this.state.frame ? place : fromMap && compose(fromMap, place);
+      const isFinite = [...position, ...rotation].every(Number.isFinite);
+      const known = !isFinite ? null : header.frame === this.state.frame ? place : fromMap && compose(fromMap, place);
       this.child = frame;
       if (known) {
         // A map that has not faded yet does not move.
@@ -136,7 +143,7 @@ export class MixedReality {
   }
 
   // Takes transforms: those of the headset confirm its pose.
-  heard(transforms) {
+  confirm(transforms) {
     if (this.isOk && transforms.some(({ child }) => child === this.child)) this.heardAt = performance.now();
   }
 
@@ -155,7 +162,7 @@ export class MixedReality {
   }
 
   // State as title, text, kind and filled part of the ring.
-  told(now) {
+  status(now) {
     const { sender } = this;
     const { surfaces, left } = sender.counts;
     if (!this.state.open) return { title: "No connection", text: "The robot is not reached. Trying again.", kind: "bad", part: 0 };
@@ -204,7 +211,7 @@ export class MixedReality {
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     this.drawn = 0;
-    this.sign.set(this.told(now));
+    this.sign.set(this.status(now));
     if (viewer) {
       gl.enable(gl.SCISSOR_TEST);
       for (const view of viewer.views) this.draw(view, viewer, layer.getViewport(view), now);

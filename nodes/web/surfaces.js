@@ -11,9 +11,10 @@ const NO_CLASS = 65535;
 const GLOBAL_MESH = /^global[ _-]?mesh$/;
 // Numbers of each array in a chunk, which has 50 kB then.
 const CHUNK = 5000;
-// Limits of a session: surfaces, and triangles of all of them.
+// Limits of a session: surfaces, triangles of all of them, and vertices of one.
 const MOST_SURFACES = 256;
 const MOST_TRIANGLES = 300000;
+const MOST_VERTICES = 300000;
 // Bytes sent per second, and the smallest time between two states of a surface, ms.
 const BYTES_A_SECOND = 400000;
 const AGAIN_MS = 4000;
@@ -147,7 +148,8 @@ export class SurfaceSender {
     Object.assign(this.counts, { surfaces: 0, triangles: 0, left: 0 });
     for (const surface of surfaces) {
       const triangles = surface.indices.length / 3;
-      if (this.counts.surfaces >= MOST_SURFACES || this.counts.triangles + triangles > MOST_TRIANGLES) {
+      const isLarge = surface.vertices.length > 3 * MOST_VERTICES || this.counts.triangles + triangles > MOST_TRIANGLES;
+      if (isLarge || this.counts.surfaces >= MOST_SURFACES) {
         this.counts.left++;
         continue;
       }
