@@ -8,7 +8,8 @@ export const LABELS = [
   "wall", "floor", "ceiling", "table", "couch", "door", "window", "shelf", "bed", "screen", "lamp", "plant", "wall art", "other",
 ];
 const NO_CLASS = 65535;
-const GLOBAL_MESH = /^global[ _-]?mesh$/;
+// Triangles of a box: some devices give boxes about furniture as meshes.
+const BOX = 12;
 // Numbers of each array in a chunk, which has 50 kB then.
 const CHUNK = 5000;
 // Limits of a session: surfaces, triangles of all of them, and vertices of one.
@@ -75,9 +76,11 @@ function placed(vertices, { transform: { position, orientation } }) {
   return out;
 }
 
+// Classes of triangles: that of the surface, else of the labelled region about each.
 function classesOf({ vertices, indices, pose, label }, regions) {
   const triangles = Math.floor(indices.length / 3);
-  if (!regions) return new Uint16Array(triangles).fill(classOf(label));
+  const own = classOf(label);
+  if (own !== NO_CLASS) return new Uint16Array(triangles).fill(own);
   const { position, orientation: o } = pose.transform;
   const corner = (i) => vertices.subarray(3 * i, 3 * i + 3);
   return Uint16Array.from({ length: triangles }, (_, t) => {
@@ -87,18 +90,18 @@ function classesOf({ vertices, indices, pose, label }, regions) {
   });
 }
 
-// Surfaces that the device shows in a frame, by their object: meshes, or planes where there are no meshes. Where one mesh
-// is the whole room, the others, which are boxes, and the planes give it their labels and are not sent.
+// Surfaces that the device shows in a frame, by their object: meshes; without them planes, else boxes. Boxes and planes give
+// their labels to meshes without one.
 function surfacesOf(frame, reference) {
   const found = (all) => [...all ?? []].map((object) => ({ object, pose: frame.getPose(object.meshSpace ?? object.planeSpace, reference) })).filter(({ pose }) => pose);
   const meshes = found(frame.detectedMeshes).map(({ object, pose }) => ({
     object, pose, vertices: object.vertices, indices: object.indices, label: object.semanticLabel, changed: object.lastChangedTime,
   }));
   const planes = found(frame.detectedPlanes).map(({ object, pose }) => ({ object, pose, ...ofPlane(object), label: object.semanticLabel, changed: object.lastChangedTime }));
-  const isWhole = ({ label }) => GLOBAL_MESH.test((label ?? "").toLowerCase());
-  const whole = meshes.filter(isWhole);
-  if (whole.length === 0) return { surfaces: meshes.length > 0 ? meshes : planes, regions: null };
-  return { surfaces: whole, regions: () => [...meshes.filter((mesh) => !isWhole(mesh)), ...planes].map(regionOf) };
+  const isBox = ({ indices }) => indices.length <= 3 * BOX;
+  const boxes = meshes.filter(isBox);
+  const surfaces = [meshes.filter((mesh) => !isBox(mesh)), planes, boxes].find((all) => all.length > 0) ?? [];
+  return { surfaces, regions: () => [...boxes, ...planes].map(regionOf) };
 }
 
 function isMoved(a, b) {
@@ -164,7 +167,7 @@ export class SurfaceSender {
       }
       const name = known?.name ?? `surface ${this.next++}`;
       this.known.set(surface.object, { name, sum, changed: surface.changed, pose: surface.pose, at: now });
-      labels ??= regions?.();
+      labels ??= regions();
       this.queue = this.queue.filter((waiting) => waiting.name !== name);
       this.queue.push(this.parts(name, surface, labels));
     }

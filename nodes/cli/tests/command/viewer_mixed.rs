@@ -48,9 +48,9 @@ const OFF: &str = "new Promise((done) => { globalThis.truth = (frame) => { const
     const matrix = ({ position: [x, y, z], rotation }) => { const c = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => turn(rotation, axis)); \
       return DOMMatrix.fromFloat64Array(new Float64Array([...c.flatMap((p) => [p.x, p.y, p.z, 0]), x, y, z, 1])); }; \
     const of = (m) => DOMMatrix.fromFloat64Array(Float64Array.from(m)); \
-    const [mesh] = [...frame.trueMeshes ?? frame.detectedMeshes].filter(({ semanticLabel }) => /global/i.test(semanticLabel)); \
+    const [mesh] = [...frame.trueMeshes ?? frame.detectedMeshes].sort((a, b) => b.vertices.length - a.vertices.length); \
     const reference_from_mesh = of(frame.getPose(mesh.meshSpace, mixed.reference).transform.matrix); \
-    const entity = room.spatialEntities.find((one) => one.semanticLabel_META === 'GLOBAL_MESH').locatable_META; \
+    const entity = room.spatialEntities.find((one) => one.triangleMesh_META).locatable_META; \
     const { position: p, orientation: o } = entity; \
     const capture_from_mesh = matrix({ position: [p.x, p.y, p.z], rotation: [o.x, o.y, o.z, o.w] }); \
     const ros = new DOMMatrix([0, -1, 0, 0, 0, 0, 1, 0, -1, 0, 0, 0, 0, 0, 0, 1]); \
@@ -136,7 +136,7 @@ fn robot(folder: &Path, room: &Path) -> String {
 }
 
 /// A page whose emulated headset is in one room, of a robot that has mapped a room.
-fn open(chromium: &Path, node: &Path, params: &str, room: &str) -> (Viewer, Page) {
+fn open(chromium: &Path, node: &Path, params: &str, room: &str) -> (LoopbackDomain, Viewer, Page) {
     let domain = LoopbackDomain::take().unwrap();
     let viewer = Viewer::start_in(&domain, &["view", params, "--port", "0"]);
     let mut page = Page::open(chromium, "about:blank");
@@ -146,7 +146,7 @@ fn open(chromium: &Path, node: &Path, params: &str, room: &str) -> (Viewer, Page
         "lattice.state.complete && lattice.state.size > 1000 && !{BUTTON}.hidden && lattice.mixed.services.find('calibrate')"
     ));
     page.value(WATCH);
-    (viewer, page)
+    (domain, viewer, page)
 }
 
 /// Presses the button and agrees.
@@ -188,7 +188,7 @@ fn the_map_stands_in_the_room_of_a_headset_and_is_found_again_after_recentring()
     };
     let folder = tempfile::tempdir().unwrap();
     let params = robot(folder.path(), &capture(&node, "living_room"));
-    let (_viewer, mut page) = open(&chromium, &node, &params, "living_room");
+    let (_domain, _viewer, mut page) = open(&chromium, &node, &params, "living_room");
     // Without the user's agreement nothing begins.
     page.value(&format!("{BUTTON}.click()"));
     page.value("document.querySelector('#ask button').click()");
@@ -228,7 +228,7 @@ fn nothing_of_a_robot_is_drawn_in_a_room_that_it_has_not_mapped() {
     };
     let folder = tempfile::tempdir().unwrap();
     let params = robot(folder.path(), &capture(&node, "office_small"));
-    let (_viewer, mut page) = open(&chromium, &node, &params, "living_room");
+    let (_domain, _viewer, mut page) = open(&chromium, &node, &params, "living_room");
     agree(&mut page);
     page.wait_for("lattice.mixed.verdict > 1 && lattice.mixed.reason !== ''");
     let verdict = texts(&mut page);
@@ -247,6 +247,21 @@ fn nothing_of_a_robot_is_drawn_in_a_room_that_it_has_not_mapped() {
 }
 
 #[test]
+fn the_map_stands_in_the_other_captured_rooms() {
+    let Some(chromium) = chromium() else { return };
+    let Some(node) = folder().map(PathBuf::from) else {
+        return;
+    };
+    for room in ["office_small", "meeting_room", "office_large", "music_room"] {
+        let folder = tempfile::tempdir().unwrap();
+        let params = robot(folder.path(), &capture(&node, room));
+        let (_domain, _viewer, mut page) = open(&chromium, &node, &params, room);
+        agree(&mut page);
+        is_right(&mut page);
+    }
+}
+
+#[test]
 fn planes_alone_place_the_map_where_the_device_has_no_meshes() {
     let Some(chromium) = chromium() else { return };
     let Some(node) = folder().map(PathBuf::from) else {
@@ -254,7 +269,7 @@ fn planes_alone_place_the_map_where_the_device_has_no_meshes() {
     };
     let folder = tempfile::tempdir().unwrap();
     let params = robot(folder.path(), &capture(&node, "living_room"));
-    let (_viewer, mut page) = open(&chromium, &node, &params, "living_room");
+    let (_domain, _viewer, mut page) = open(&chromium, &node, &params, "living_room");
     page.value(PLANES);
     agree(&mut page);
     is_right(&mut page);
