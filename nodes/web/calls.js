@@ -2,6 +2,7 @@
 
 const CALL = 2;
 const RESPONSE = 3;
+const MESSAGE_DATA = 1;
 const CDR = new TextEncoder().encode("cdr");
 
 // Handles text messages of services and parameters; true if handled.
@@ -25,6 +26,27 @@ export function takeData(bytes) {
   return true;
 }
 
+// Topics of this connection that the page publishes, with their channel ids.
+const published = new Map();
+
+// Begins a connection: its topics are advertised again.
+export function connected() {
+  published.clear();
+}
+
+// Publishes a CDR message on a headset topic.
+function publish(socket, { topic, schemaName, bytes }) {
+  if (!published.has(topic)) {
+    published.set(topic, published.size + 1);
+    send(socket, JSON.stringify({ op: "advertise", channels: [{ id: published.get(topic), topic, encoding: "cdr", schemaName }] }));
+  }
+  const message = new Uint8Array(5 + bytes.length);
+  message[0] = MESSAGE_DATA;
+  new DataView(message.buffer).setUint32(1, published.get(topic), true);
+  message.set(bytes, 5);
+  send(socket, message);
+}
+
 // Sends a request of the page; true if it is one.
 export function ask(socket, data) {
   if (data.type === "call") {
@@ -35,6 +57,8 @@ export function ask(socket, data) {
     bytes.set(CDR, 13);
     bytes.set(data.request, 13 + CDR.length);
     send(socket, bytes);
+  } else if (data.type === "publish") {
+    publish(socket, data);
   } else if (data.type === "get") {
     send(socket, JSON.stringify({ op: "getParameters", parameterNames: [] }));
   } else if (data.type === "set") {

@@ -66,3 +66,56 @@ export class Reader {
     return Array.from({ length: count }, () => read(this));
   }
 }
+
+const SIZES = { u16: 2, u32: 4, i32: 4, f32: 4, f64: 8 };
+const SETTERS = { u16: "setUint16", u32: "setUint32", i32: "setInt32", f32: "setFloat32", f64: "setFloat64" };
+const utf8 = new TextEncoder();
+
+// CDR writer: little-endian, with a capacity in bytes.
+export class Writer {
+  constructor(capacity) {
+    this.bytes = new Uint8Array(capacity);
+    this.view = new DataView(this.bytes.buffer);
+    this.bytes[1] = 1;
+    this.at = HEADER;
+  }
+
+  number(kind, value) {
+    const size = SIZES[kind];
+    this.at = Math.ceil((this.at - HEADER) / size) * size + HEADER;
+    this.view[SETTERS[kind]](this.at, value, true);
+    this.at += size;
+    return this;
+  }
+
+  bool(value) {
+    this.bytes[this.at++] = value ? 1 : 0;
+    return this;
+  }
+
+  u16(value) { return this.number("u16", value); }
+  u32(value) { return this.number("u32", value); }
+  i32(value) { return this.number("i32", value); }
+
+  f64s(values) {
+    for (const value of values) this.number("f64", value);
+    return this;
+  }
+
+  string(words) {
+    const bytes = utf8.encode(words);
+    this.u32(bytes.length + 1);
+    this.bytes.set(bytes, this.at);
+    this.at += bytes.length + 1;
+    return this;
+  }
+
+  // A sequence of numbers.
+  numbers(kind, values) {
+    this.u32(values.length);
+    for (const value of values) this.number(kind, value);
+    return this;
+  }
+
+  done() { return this.bytes.subarray(0, this.at); }
+}

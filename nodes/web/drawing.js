@@ -21,6 +21,8 @@ export class Drawing {
   constructor(parts) {
     Object.assign(this, parts);
     this.waiting = false;
+    // True while a headset draws.
+    this.paused = false;
     // Frame in progress on the GPU, and true if another one must follow.
     this.fence = null;
     this.due = false;
@@ -60,6 +62,7 @@ export class Drawing {
   frame() {
     const { gl, state } = this;
     this.waiting = false;
+    if (this.paused) return;
     this.due = this.fence !== null;
     if (this.due) return;
     this.drawNow();

@@ -4,8 +4,8 @@ import { add, cross, dot, length, scale } from "./math.js";
 import { by, element, metres } from "./panel.js";
 import { turned } from "./scene.js";
 
-const OK = 1;
-const VERDICTS = ["nothing found yet", "OK", "AMBIGUOUS", "DEGENERATE", "NO OVERLAP", "REJECTED INPUT"];
+export const OK = 1;
+export const VERDICTS = ["nothing found yet", "OK", "AMBIGUOUS", "DEGENERATE", "NO OVERLAP", "REJECTED INPUT"];
 const ROTATION = 1;
 const MOST_WEAK = 6;
 const WEAK_INK = [0.95, 0.6, 0.95, 1];

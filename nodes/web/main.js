@@ -9,6 +9,7 @@ import { placeIndex } from "./keys.js";
 import { Layers } from "./layers.js";
 import { legendOf, showLegend } from "./legend.js";
 import { add, length, rotate, sub } from "./math.js";
+import { MixedReality } from "./mixed.js";
 import * as panel from "./panel.js";
 import { pictureOf } from "./picture.js";
 import { Planning } from "./planning.js";
@@ -58,6 +59,7 @@ const slice = new Slice((bounds) => {
   cells.slice = bounds;
   redraw();
 });
+const mixed = new MixedReality({ gl, cells, drawing, services, worker, state, transforms: () => transforms });
 const planning = drawing.planning = new Planning({ services, camera, state, redraw });
 
 // --- Messages of the worker.
@@ -73,6 +75,7 @@ const handlers = {
     Object.assign(state, { open: true, file, thin, published: null });
     services.offered = [];
     writing.offered();
+    mixed.connected();
     state.heardAt = Date.now();
   },
   closed() {
@@ -107,6 +110,7 @@ const handlers = {
   },
   transforms({ transforms: come, fixed }) {
     transforms.add(come);
+    mixed.confirm(come);
     if (!fixed) player.heard(come.at(-1)?.stamp);
     const robot = transforms.find(state.frame, ROBOT);
     if (robot) {
@@ -124,6 +128,7 @@ const handlers = {
   calibration({ said }) {
     state.headset = headset.headsetOf(said);
     headset.showVerdict(said);
+    mixed.calibrated(said);
     state.calibrated = true;
     layers.show();
     redraw();
@@ -375,7 +380,7 @@ redraw();
 
 // For tests: the displayed state as numbers.
 window.lattice = {
-  state, camera, cells, drawing, free, picture, planning, player, slice, pick, frame: () => drawing.drawNow(),
+  state, camera, cells, drawing, free, mixed, picture, planning, player, slice, pick, frame: () => drawing.drawNow(),
   // Keys, or counts in key order.
   keys: (what = "keys") => new Promise((resolve) => {
     const take = ({ data }) => {

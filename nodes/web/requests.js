@@ -1,6 +1,6 @@
 // CDR service requests, and decoding of responses.
 
-import { Reader } from "./cdr.js";
+import { Reader, Writer } from "./cdr.js";
 
 // Little-endian CDR of numbers, each with its type letter.
 function cdr(...parts) {
@@ -29,6 +29,8 @@ export const requests = {
   query: (point) => points(point),
   plan: (start, goal, radius, tolerance) => points(start, goal, [radius, tolerance]),
   setRate: (rate) => cdr(["d", rate]),
+  // Without a guess, for a session of the headset.
+  calibrate: (session) => new Writer(100 + 4 * session.length).bool(false).f64s([0, 0, 0, 0, 0, 0, 1]).string(session).done(),
   seek: (time) => cdr(["i", Math.floor(time)], ["u", Math.floor((time % 1) * 1e9)]),
 };
 

@@ -25,12 +25,12 @@ export class Services {
     return this.offered.find(({ name }) => name.endsWith(`/${end}`));
   }
 
-  call(end, request) {
+  call(end, request, patience = PATIENCE_MS) {
     const service = this.find(end);
     if (!service) return Promise.reject(new Error(`${end} is not offered`));
     const call = this.next++;
     return new Promise((resolve, reject) => {
-      const late = setTimeout(() => this.answered({ call, error: "no reply" }), PATIENCE_MS);
+      const late = setTimeout(() => this.answered({ call, error: "no reply" }), patience);
       this.waiting.set(call, { resolve, reject, late });
       this.worker.postMessage({ type: "call", service: service.id, call, request });
     });

@@ -219,3 +219,21 @@ uniform vec4 u_ink;
 in float v_far;
 out vec4 o_colour;
 void main() { o_colour = vec4(u_ink.rgb, u_ink.a * (1.0 - smoothstep(0.3, 1.0, v_far))); }`;
+
+// A text panel in front of the eyes.
+export const SIGN_VERTEX = `#version 300 es
+layout(location = 0) in vec3 a_place;
+uniform mat4 u_clip;
+uniform vec2 u_half;         // half width and height of the panel, m
+out vec2 v_at;
+void main() {
+  v_at = a_place.xy * 0.5 + 0.5;
+  gl_Position = u_clip * vec4(a_place.xy * u_half, 0.0, 1.0);
+}`;
+
+export const SIGN_FRAGMENT = `#version 300 es
+precision mediump float;
+uniform sampler2D u_text;
+in vec2 v_at;
+out vec4 o_colour;
+void main() { o_colour = texture(u_text, v_at); }`;

@@ -72,6 +72,7 @@ function onText(message) {
   if (calls.takeText(message)) return;
   if (message.op === "serverInfo") {
     retry = 250;
+    calls.connected();
     if (session !== message.sessionId) {
       session = message.sessionId;
       // A restarted server: the previous state is invalid once its map arrives.

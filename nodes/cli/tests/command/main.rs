@@ -40,6 +40,7 @@ mod viewer_foreign;
 mod viewer_headset;
 mod viewer_hostile;
 mod viewer_layout;
+mod viewer_mixed;
 mod viewer_page;
 mod viewer_planning;
 mod viewer_survey;

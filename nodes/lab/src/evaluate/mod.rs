@@ -41,7 +41,7 @@ pub use odometry::{OdometryLog, OdometryTrial, measure_log, odometry_report, run
 pub use reliability::reliability_report;
 pub use report::report;
 pub use results::Results;
-pub use rooms::{RoomCase, rooms_report};
+pub use rooms::{RoomCase, map_of_capture, rooms_report};
 pub use run::run;
 pub use scans::{Scans, scans_report};
 #[cfg(test)]

@@ -45,6 +45,7 @@ const FILES: &[File] = files! {
     "/main.js" "main.js" JAVASCRIPT;
     "/math.js" "math.js" JAVASCRIPT;
     "/messages.js" "messages.js" JAVASCRIPT;
+    "/mixed.js" "mixed.js" JAVASCRIPT;
     "/panel.js" "panel.js" JAVASCRIPT;
     "/picture.js" "picture.js" JAVASCRIPT;
     "/planning.js" "planning.js" JAVASCRIPT;
@@ -55,7 +56,9 @@ const FILES: &[File] = files! {
     "/scene.js" "scene.js" JAVASCRIPT;
     "/services.js" "services.js" JAVASCRIPT;
     "/shaders.js" "shaders.js" JAVASCRIPT;
+    "/sign.js" "sign.js" JAVASCRIPT;
     "/slice.js" "slice.js" JAVASCRIPT;
+    "/surfaces.js" "surfaces.js" JAVASCRIPT;
     "/transforms.js" "transforms.js" JAVASCRIPT;
     "/worker.js" "worker.js" JAVASCRIPT;
     "/writing.js" "writing.js" JAVASCRIPT;
@@ -82,7 +85,7 @@ mod tests {
             assert!(find(&path).is_some(), "{path} is not in the table");
         }
         let bytes: usize = FILES.iter().map(|file| file.bytes.len()).sum();
-        assert!(bytes < 150_000, "{bytes} bytes");
+        assert!(bytes < 185_000, "{bytes} bytes");
         assert!(find("/../Cargo.toml").is_none());
     }
 }

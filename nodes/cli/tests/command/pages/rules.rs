@@ -143,6 +143,11 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     ),
     ("docs/headset.md", "lattice run", Works("lattice_mapper")),
     (
+        "docs/mixed_reality.md",
+        "lattice run",
+        Works("lattice_mapper"),
+    ),
+    (
         "docs/nodes.md",
         "lattice node lattice_mapper",
         Works("lattice_mapper"),

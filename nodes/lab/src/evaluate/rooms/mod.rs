@@ -8,11 +8,12 @@ mod room;
 pub use report::rooms_report;
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, register_global,
+    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, SemanticCloud,
+    register_global,
 };
 use nalgebra::{Isometry3, Matrix3x6, Point3, Vector3};
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::many::Case;
@@ -91,6 +92,17 @@ impl Case for RoomCase {
             ..trial.with_judgement(&found, &truth)
         })
     }
+}
+
+/// Map of a robot in a captured room, in the frame of the capture with the axes of ROS; the robot's sensor is high.
+///
+/// # Errors
+/// If the file is no capture, or the room has no place to stand.
+pub fn map_of_capture(path: &Path, seed: u64) -> Result<SemanticCloud, AnyError> {
+    let (mesh, _) = capture::read_capture(path)?;
+    let name = path.display().to_string();
+    let [_, (_, heights_m)] = SENSORS;
+    Room::new(name, &mesh)?.map(heights_m, &mut Stream::numbered(seed, 0))
 }
 
 /// Distance of the middle of the seen points from the truth, metres, its stated standard deviation in that direction,
