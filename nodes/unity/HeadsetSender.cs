@@ -59,8 +59,8 @@ namespace Lattice
     /// <summary>A headset for headset_cloud. Times are in s since 1970, of one clock for all.</summary>
     public sealed class HeadsetSender
     {
-        /// <summary>Numbers of an array in a message: 48 kB.</summary>
-        public int Chunk = 12000;
+        /// <summary>Numbers of each array in a message: 50 kB of vertices, triangles and classes.</summary>
+        public int Chunk = 5000;
         readonly Stream stream;
         readonly string frame, camera;
         /// <summary>Registers its topics; `stream` is that of a TcpClient to the endpoint, port 10000.</summary>
