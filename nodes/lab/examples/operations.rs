@@ -1,8 +1,9 @@
 //! Quantizes, inserts or transforms the same points some times over, for tools that count what that takes.
 //!
 //! `operations OPERATION LATTICE CELL_SIDE_M FILE TIMES`, where OPERATION is batch, portable, scalar,
-//! paper27, occupancy, list, transform (all points at the stamp), deskew (times of 1024 columns are read, and each has its
-//! pose) or viewpoints (which are written too), and FILE holds little-endian f32 `x y z i`; prints the number of points.
+//! paper27, occupancy, list, rays (occupied and free cells, scan by scan from FILE.scans), transform (all points at the
+//! stamp), deskew (times of 1024 columns are read, and each has its pose) or viewpoints (which are written too), and FILE holds
+//! little-endian f32 `x y z i`; prints the number of points.
 #![allow(clippy::unwrap_used)]
 
 use lattice_core::cloud::{
@@ -11,10 +12,12 @@ use lattice_core::cloud::{
 };
 use lattice_core::lattice::{BatchQuantizer, BlockKey, Lattice, LatticeKind, Simd};
 use lattice_core::voxels::{OccupancyList, VoxelList, VoxelStore};
+use lattice_lab::bench::{RaycastMethod, raycast, read_scans};
 use lattice_lab::paper_values::Search27;
 use nalgebra::{Isometry3, Vector3};
 use std::convert::Infallible;
 use std::hint::black_box;
+use std::path::Path;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -29,11 +32,23 @@ fn main() {
     let points: Vec<[f32; 3]> = (0..bytes.len() / 16)
         .map(|i| [0, 1, 2].map(|axis| number(4 * i + axis)))
         .collect();
-    let run = of(operation, &lattice, points.clone());
+    let run = match operation.as_str() {
+        "rays" => rays(&lattice, points.clone(), Path::new(file)),
+        _ => of(operation, &lattice, points.clone()),
+    };
     for _ in 0..times.parse::<usize>().unwrap() {
         run();
     }
     println!("{}", points.len());
+}
+
+/// Free space of all scans.
+fn rays(lattice: &Lattice, points: Vec<[f32; 3]>, file: &Path) -> Box<dyn Fn()> {
+    let (lattice, scans) = (lattice.clone(), read_scans(file, points.len()).unwrap());
+    Box::new(move || {
+        let report = raycast(RaycastMethod::Map, &lattice, points.clone(), &scans).unwrap();
+        black_box(report.voxels);
+    })
 }
 
 /// One operation on all points.
