@@ -39,10 +39,12 @@ impl Corridor {
         check_size(lattice, radius_m, reach_m)?;
         // Contact blocks; the slack makes that independent of rounding.
         let blocked_m = radius_m + 1e-9 * covering_m;
+        let length_m = |step: &LatticeIndex| f64::from(stride) * lattice.center(*step).norm();
+        let longest_m = steps.iter().map(length_m).fold(0.0, f64::max);
+        let near = steps_within(lattice, reach_m + longest_m);
         let touching = |to: LatticeIndex| -> Vec<LatticeIndex> {
             let (from_m, to_m) = (lattice.center([0; 3]), lattice.center(to));
             let line = Segment { from_m, to_m };
-            let near = steps_within(lattice, reach_m + to_m.norm()).into_iter();
             let touches = |w: &LatticeIndex| {
                 let center_m = lattice.center(*w);
                 // Most cells are told by the radii between which their surface lies.
@@ -51,7 +53,7 @@ impl Corridor {
                     || beyond_m < 1.001 * covering_m
                         && cell_distance_m(&line, lattice.cell(), &center_m) <= blocked_m
             };
-            near.map(|step| step.by).filter(touches).collect()
+            near.iter().map(|step| step.by).filter(touches).collect()
         };
         let ball = touching([0; 3]);
         // One direction decides for both, so that paths are reversible.
@@ -66,7 +68,6 @@ impl Corridor {
             cells.iter().map(|w| add(*w, by)).collect()
         };
         let ways: Vec<_> = steps.iter().map(&mut way).collect();
-        let length_m = |step: &LatticeIndex| f64::from(stride) * lattice.center(*step).norm();
         Ok(Corridor {
             all: Stencil::new(ways.iter().chain([&ball]).flatten().copied()),
             ball: Stencil::new(ball),

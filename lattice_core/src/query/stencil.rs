@@ -101,6 +101,8 @@ pub(super) struct Around {
     place: LatticeIndex,
     low: LatticeIndex,
     sides: LatticeIndex,
+    /// Number of each block's mask; 0 for blocks without occupied cells.
+    numbers: Vec<u32>,
     masks: Vec<BlockMask>,
 }
 
@@ -112,13 +114,21 @@ impl Around {
         [low, high]: [LatticeIndex; 2],
         occupied: impl Fn(u64) -> BlockMask,
     ) -> Around {
-        let mut masks = Vec::new();
+        let (mut numbers, mut masks) = (Vec::new(), Vec::new());
         for x in low[0]..=high[0] {
             for y in low[1]..=high[1] {
                 for z in low[2]..=high[2] {
                     let w = [at[0] + SIDE * x, at[1] + SIDE * y, at[2] + SIDE * z];
                     let block = BlockKey::pack(w).map(BlockKey::block);
-                    masks.push(block.map_or([0; 8], &occupied));
+                    let mask = block.map_or([0; 8], &occupied);
+                    if mask != [0; 8] {
+                        masks.push(mask);
+                    }
+                    numbers.push(if mask == [0; 8] {
+                        0
+                    } else {
+                        masks.len() as u32
+                    });
                 }
             }
         }
@@ -126,18 +136,19 @@ impl Around {
             place: at.map(|i| i & (SIDE - 1)),
             low,
             sides: [0, 1, 2].map(|axis| high[axis] - low[axis] + 1),
+            numbers,
             masks,
         }
     }
 
     /// Tests whether no cell is occupied.
     pub(super) fn is_empty(&self) -> bool {
-        self.masks.iter().all(|mask| *mask == [0; 8])
+        self.masks.is_empty()
     }
 
     /// Memory of the cells, bytes.
     pub(super) fn bytes(&self) -> usize {
-        size_of::<BlockMask>() * self.masks.len()
+        size_of::<u32>() * self.numbers.capacity() + size_of::<BlockMask>() * self.masks.capacity()
     }
 
     fn word(&self, x: i32, y: i32, z: i32, word: i32) -> u64 {
@@ -145,8 +156,11 @@ impl Around {
         if (0..3).any(|axis| !(0..self.sides[axis]).contains(&at[axis])) {
             return 0;
         }
-        let place = (at[0] * self.sides[1] + at[1]) * self.sides[2] + at[2];
-        let mask = self.masks.get(place as usize);
+        let block = (at[0] * self.sides[1] + at[1]) * self.sides[2] + at[2];
+        let number = self.numbers.get(block as usize).copied().unwrap_or(0);
+        let mask = (number as usize)
+            .checked_sub(1)
+            .and_then(|i| self.masks.get(i));
         mask.and_then(|mask| mask.get(word as usize))
             .copied()
             .unwrap_or(0)

@@ -7,13 +7,14 @@ use super::path_error::PathError;
 use super::{Query, QueryError, Segment};
 use crate::voxels::VoxelStore;
 
-/// Limit of the length of a step, cells: a block of long steps looks at the cells of as many blocks to each side.
-const MAX_STRIDE: f64 = 8.0;
+/// Limits of the first stride, cells: with 1 a point needs millions of cells in the open, and above 8 the blocks that a
+/// step may pass through are too many to be worth it.
+const STRIDES: std::ops::RangeInclusive<f64> = 2.0..=8.0;
 
 impl<S: VoxelStore> Query<'_, S> {
     /// Finds a path of long free segments for a ball in a fraction of the time of [`Query::shortest_path`].
     ///
-    /// Steps of up to two radii in many directions are searched first, then steps of half the length, down to those
+    /// Steps of up to two radii (or four cells) in many directions are searched first, then steps of half the length, down to those
     /// of `shortest_path`, until a path is found. Each place and each step is tested against all cells. The path is
     /// shortened: `keys` are the cells of its corners. Long steps may miss a gap that is hardly wider than the ball,
     /// and find a longer way.
@@ -37,7 +38,7 @@ impl<S: VoxelStore> Query<'_, S> {
     ) -> Result<Path, PathError> {
         let [start, goal] = self.ends(start_m, goal_m, options)?;
         let strides = options.radius_m / self.store.lattice().cell_side_m();
-        let mut stride = 1 << strides.clamp(1.0, MAX_STRIDE).log2() as i32;
+        let mut stride = 1 << strides.clamp(*STRIDES.start(), *STRIDES.end()).log2() as i32;
         let mut expanded = 0;
         loop {
             let left = PathOptions {
