@@ -17,7 +17,7 @@ impl<S: VoxelStore> Query<'_, S> {
     /// Steps of up to two radii (or four cells) in many directions are searched first, then steps of half the length, down to those
     /// of `shortest_path`, until a path is found. Each place and each step is tested against all cells. The path is
     /// shortened: `keys` are the cells of its corners. Long steps may miss a gap that is hardly wider than the ball,
-    /// and find a longer way.
+    /// and find a longer way. `options.steps` are those of single cells.
     pub fn straight_path(
         &self,
         start_m: &Vector3<f64>,
