@@ -8,7 +8,6 @@ use super::slice::Slice;
 use super::topic_plan::TopicPlan;
 use super::topics::TopicError;
 use crate::enu_transformer::{LogSamples, TransformerOptions};
-use crate::voxel_marker_publisher::MarkerOptions;
 use lattice_core::raycast::FreeSpaceError;
 use thiserror::Error;
 
@@ -35,7 +34,7 @@ pub fn mount_samples(
     limit: usize,
     progress: &mut dyn FnMut(f64),
 ) -> Result<(LogSamples, RunReport), SampleError> {
-    let mut pipeline = Pipeline::new(transformer, [], &MarkerOptions::default())?;
+    let mut pipeline = Pipeline::new(transformer, [], None)?;
     pipeline.transformer.keep_samples(limit);
     let report = run(bag, plan, slice, &mut pipeline, "", progress)?;
     Ok((pipeline.transformer.take_samples(), report))

@@ -38,7 +38,7 @@ const ODOMETRY_PART: f64 = 0.8;
 /// Time between two updates of the map to its followers, in log time.
 const UPDATE_PERIOD_NS: i64 = 1_000_000_000;
 
-/// The machines of a replay: one transformer, any number of maps with their markers.
+/// The machines of a replay: one transformer, any number of maps, with their markers if asked for.
 pub struct Pipeline {
     pub(super) transformer: EnuTransformer,
     depth_clouds: Option<DepthClouds>,
@@ -50,8 +50,8 @@ pub struct Pipeline {
 
 struct Branch {
     mapper: LatticeMapper,
-    markers: VoxelMarkers,
-    report: MarkerReport,
+    markers: Option<VoxelMarkers>,
+    published_bytes: u64,
 }
 
 impl Pipeline {
@@ -59,13 +59,13 @@ impl Pipeline {
     pub fn new(
         transformer: TransformerOptions,
         maps: impl IntoIterator<Item = MapperOptions>,
-        markers: &MarkerOptions,
+        markers: Option<&MarkerOptions>,
     ) -> Result<Self, FreeSpaceError> {
         let branch = |options| -> Result<Branch, FreeSpaceError> {
             Ok(Branch {
                 mapper: LatticeMapper::new(options, EPOCH)?,
-                markers: VoxelMarkers::new(markers.clone()),
-                report: MarkerReport::default(),
+                markers: markers.cloned().map(VoxelMarkers::new),
+                published_bytes: 0,
             })
         };
         Ok(Self {
@@ -233,29 +233,43 @@ impl Pipeline {
 impl Branch {
     /// Passes changes of the map to the markers, as the nodes do by topics.
     fn update(&mut self) {
-        if self.markers.voxels() == 0 {
+        let Some(markers) = &mut self.markers else {
+            // Changes that nobody follows are not kept.
+            self.mapper.take_update();
+            return;
+        };
+        if markers.voxels() == 0 {
             for chunk in self.mapper.keyframe() {
-                if let Err(error) = self.markers.on_map(&chunk) {
+                if let Err(error) = markers.on_map(&chunk) {
                     log::warn!("{error}");
                 }
             }
         }
         for chunk in self.mapper.take_update() {
-            if let Err(error) = self.markers.on_update(&chunk) {
+            if let Err(error) = markers.on_update(&chunk) {
                 log::warn!("{error}");
             }
         }
-        self.report.published_bytes += self.markers.take_bytes() as u64;
+        self.published_bytes += markers.take_bytes() as u64;
     }
 
     fn finish(&mut self) -> LatticeReport {
-        self.report.counts = self.markers.counts().clone();
-        self.report.voxels = self.markers.voxels();
-        self.markers.wipe();
-        self.report.marker_bytes = self.markers.take_bytes();
+        let markers = self.markers.as_mut().map(|markers| {
+            let report = MarkerReport {
+                counts: markers.counts().clone(),
+                voxels: markers.voxels(),
+                published_bytes: self.published_bytes,
+                ..MarkerReport::default()
+            };
+            markers.wipe();
+            MarkerReport {
+                marker_bytes: markers.take_bytes(),
+                ..report
+            }
+        });
         LatticeReport {
             map: MapperReport::of(&self.mapper),
-            markers: self.report.clone(),
+            markers,
         }
     }
 }

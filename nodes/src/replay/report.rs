@@ -16,8 +16,8 @@ use crate::voxel_marker_publisher::MarkerReport;
 pub struct LatticeReport {
     /// The map.
     pub map: MapperReport,
-    /// Report of the markers.
-    pub markers: MarkerReport,
+    /// Report of the markers, if they were drawn.
+    pub markers: Option<MarkerReport>,
 }
 
 /// A run whose map stayed empty.
@@ -64,6 +64,12 @@ pub struct RunReport {
 }
 
 impl RunReport {
+    fn has_markers(&self) -> bool {
+        self.lattices
+            .iter()
+            .any(|lattice| lattice.markers.is_some())
+    }
+
     /// Fails with the cause unless some cloud was mapped in every lattice.
     pub fn check(&self) -> Result<(), NothingMapped> {
         let lost = self.odometry.as_ref();
@@ -240,7 +246,11 @@ impl fmt::Display for RunReport {
             "RMS (m)",
             "max (m)",
             "map bytes",
-            "marker bytes"
+            if self.has_markers() {
+                "marker bytes"
+            } else {
+                ""
+            }
         )?;
         for LatticeReport { map, markers } in &self.lattices {
             writeln!(
@@ -255,7 +265,8 @@ impl fmt::Display for RunReport {
                 map.max_distance_m,
                 map.map_bytes
                     .map_or_else(String::new, |bytes| bytes.to_string()),
-                markers.marker_bytes
+                (markers.as_ref())
+                    .map_or_else(String::new, |markers| markers.marker_bytes.to_string())
             )?;
         }
         Ok(())
@@ -278,7 +289,7 @@ mod tests {
             cameras: Vec::new(),
             lattices: vec![LatticeReport {
                 map: MapperReport::of(&mapper),
-                markers: MarkerReport::default(),
+                markers: None,
             }],
             origin: None,
             odometry: None,

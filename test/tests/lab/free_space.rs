@@ -10,7 +10,6 @@ use lattice_lab::simulate::drive::Drive;
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
-use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_runtime::params::Params;
 use lattice_runtime::ros_args::RosArgs;
 use lattice_test::data::shared;
@@ -75,11 +74,7 @@ fn maps(bag: &Path, variants: &[&[&str]]) -> Vec<BTreeSet<MortonKey>> {
     let options =
         |more: &&[&str]| MapperOptions::from_params(&params("/lattice_mapper", more)).unwrap();
     let options = variants.iter().map(options);
-    let no_markers = MarkerOptions {
-        max_voxels: 0,
-        ..MarkerOptions::default()
-    };
-    let mut pipeline = Pipeline::new(transformer, options, &no_markers).unwrap();
+    let mut pipeline = Pipeline::new(transformer, options, None).unwrap();
     let report = replay::run(
         &bag,
         &plan,

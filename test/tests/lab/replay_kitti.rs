@@ -9,7 +9,6 @@ use lattice_nodes::enu_transformer::ins::InsSource;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::RunReport;
 use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
-use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_test::data::shared;
 use std::path::Path;
 
@@ -36,7 +35,7 @@ fn replayed(bag: &Path) -> (RunReport, Pipeline) {
     options.ins.origin = Some(Geodetic::from_degrees(49.0, 8.4, 116.0).unwrap());
     let maps =
         LatticeKind::PAPER.map(|kind| MapperOptions::new(Lattice::new(kind, 0.125).unwrap()));
-    let mut pipeline = Pipeline::new(options, maps, &MarkerOptions::default()).unwrap();
+    let mut pipeline = Pipeline::new(options, maps, None).unwrap();
     let run = || {
         replay::run(
             &reader,
@@ -95,7 +94,7 @@ fn the_sqlite3_log_is_the_first_three_scans() {
     let maps =
         LatticeKind::PAPER.map(|kind| MapperOptions::new(Lattice::new(kind, 0.125).unwrap()));
     let options = TransformerOptions::new(plan.source);
-    let mut first = Pipeline::new(options, maps, &MarkerOptions::default()).unwrap();
+    let mut first = Pipeline::new(options, maps, None).unwrap();
     let mut clouds = 0;
     for message in reader.messages(&Default::default()).unwrap() {
         let message = message.unwrap();
@@ -137,7 +136,7 @@ fn odometry_and_fix_with_imu_agree() {
         let mut options = TransformerOptions::new(source);
         options.ins.origin = Some(Geodetic::from_degrees(49.0, 8.4, 116.0).unwrap());
         let maps: [MapperOptions; 0] = [];
-        let mut pipeline = Pipeline::new(options, maps, &MarkerOptions::default()).unwrap();
+        let mut pipeline = Pipeline::new(options, maps, None).unwrap();
         let mut track = Vec::new();
         for message in reader.messages(&Default::default()).unwrap() {
             let message = message.unwrap();

@@ -10,7 +10,6 @@ use lattice_msgs::sensor_msgs::LaserScan;
 use lattice_nodes::enu_transformer::{TransformerCounts, TransformerOptions};
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
-use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 
 /// Cells of a log's map, and what its transformer counted.
 fn map(folder: &Path, scans: bool) -> (Vec<MortonKey>, TransformerCounts) {
@@ -39,7 +38,7 @@ fn map(folder: &Path, scans: bool) -> (Vec<MortonKey>, TransformerCounts) {
     transformer.viewpoints = true;
     let lattice = Lattice::new(LatticeKind::Fcc, 0.125).unwrap();
     let maps = [MapperOptions::new(lattice)];
-    let mut pipeline = Pipeline::new(transformer, maps, &MarkerOptions::default()).unwrap();
+    let mut pipeline = Pipeline::new(transformer, maps, None).unwrap();
     let report = replay::run(&bag, &plan, &Slice::WHOLE, &mut pipeline, "", &mut |_| {}).unwrap();
     assert_eq!(report.losses(), Vec::<String>::new());
     let cells = pipeline.mappers().next().unwrap().cells().sorted_keys();

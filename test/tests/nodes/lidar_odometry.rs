@@ -14,7 +14,6 @@ use lattice_msgs::sensor_msgs::{Imu, PointCloud2};
 use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lidar_odometry::{LidarOdometry, LidarOdometryOptions};
 use lattice_nodes::replay::{self, Pipeline, RunReport, Slice, TopicWishes};
-use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_test::clouds::{cloud, odometry, timed_cloud};
 use lattice_test::maps;
 use nalgebra::Isometry3;
@@ -243,12 +242,8 @@ fn replayed(log: &Path) -> (RunReport, Isometry3<f64>) {
     let mut transformer = TransformerOptions::new(plan.source);
     transformer.map_frame.clone_from(&plan.map_frame);
     transformer.base_frame.clone_from(&plan.base_frame);
-    let mut pipeline = Pipeline::new(
-        transformer,
-        [maps::options(LatticeKind::Fcc, 0.2)],
-        &MarkerOptions::default(),
-    )
-    .unwrap();
+    let mut pipeline =
+        Pipeline::new(transformer, [maps::options(LatticeKind::Fcc, 0.2)], None).unwrap();
     let slice = &Slice::WHOLE;
     let report = replay::run(&bag, &plan, slice, &mut pipeline, "log", &mut |_| {}).unwrap();
     (report, pipeline.newest_pose().unwrap().map_from_base)

@@ -14,7 +14,6 @@ use lattice_nodes::enu_transformer::{EnuOutput, EnuTransformer, TransformerOptio
 use lattice_nodes::lattice_mapper::{LatticeMapper, MapperOptions};
 use lattice_nodes::map_follower::MapFollower;
 use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
-use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use lattice_test::clouds::{SECOND_NS, cloud, field, labelled_cloud, odometry};
 use lattice_test::data::shared;
 use lattice_test::maps::{self, follow_update, follower};
@@ -216,7 +215,7 @@ fn replaying_labelled_scans_gives_a_labelled_map() {
     labels.ignored.insert(0);
     map.labels = Some(labels);
     let transformer = TransformerOptions::new(plan.source);
-    let mut pipeline = Pipeline::new(transformer, [map], &MarkerOptions::default()).unwrap();
+    let mut pipeline = Pipeline::new(transformer, [map], None).unwrap();
     replay::run(
         &reader,
         &plan,

@@ -61,6 +61,9 @@ pub struct Replay {
     /// Folder of tables to add the map to, for `lattice fleet`; needs --direct and the program lattice-fleet
     #[arg(long, value_name = "DIR")]
     pub out_table: Option<PathBuf>,
+    /// Draw the markers of each map as well, and count their bytes; needs --direct, without which a node draws them
+    #[arg(long)]
+    pub markers: bool,
     /// Map although the attitudes contradict the way of the machine
     #[arg(long)]
     pub trust_attitude: bool,

@@ -87,6 +87,7 @@ impl Replay {
         }
         for (option, given) in [
             ("--out-table", self.out_table.is_some()),
+            ("--markers", self.markers),
             ("--start", self.start.is_some()),
             ("--stop", self.stop.is_some()),
         ] {
@@ -154,7 +155,7 @@ impl Replay {
             map.map_frame.clone_from(&plan.map_frame);
         }
         let markers = MarkerOptions::from_params(&self.params_of("voxel_marker_publisher")?)?;
-        let mut pipeline = Pipeline::new(transformer, maps, &markers)?;
+        let mut pipeline = Pipeline::new(transformer, maps, self.markers.then_some(&markers))?;
         if !plan.cameras.is_empty() {
             let params = self.params_of("semantic_cloud")?;
             pipeline.set_depth_clouds(DepthClouds::new(bag, plan, &params)?);

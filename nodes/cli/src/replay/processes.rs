@@ -288,7 +288,7 @@ impl Branch {
     fn end(self) -> CliResult<LatticeReport> {
         Ok(LatticeReport {
             map: self.mapper.end()?,
-            markers: self.markers.end()?,
+            markers: Some(self.markers.end()?),
         })
     }
 }

@@ -37,10 +37,18 @@ fn a_log_played_through_node_processes_gives_the_map_of_the_direct_replay() {
     let log = simulated(directory.path(), "mcap", "3");
     let given = [&*log, "--params", PARAMS, "--lattice", "fcc,mcc"];
     let common = [&given[..], &["--orientation", "ground"]].concat();
-    let direct = json(&[&["replay", "--direct"], &common[..]].concat());
+    let direct = json(&[&["replay", "--direct", "--markers"], &common[..]].concat());
     let by_param = [&given[..], &["-p", "lattice_orientation:=ground"]].concat();
     let by_param = json(&[&["replay", "--direct"], &by_param[..]].concat());
     assert_eq!(figures(&by_param), figures(&direct));
+    for (drawn, plain) in std::iter::zip(
+        direct["lattices"].as_array().unwrap(),
+        by_param["lattices"].as_array().unwrap(),
+    ) {
+        assert_eq!(drawn["markers"]["voxels"], drawn["map"]["voxels"]);
+        assert!(drawn["markers"]["marker_bytes"].as_u64().unwrap() > 0);
+        assert!(plain["markers"].is_null());
+    }
     let paper = json(&[&["replay", "--direct"], &given[..]].concat());
     assert_ne!(figures(&paper), figures(&direct));
     let played = json(&[&["replay"], &common[..]].concat());

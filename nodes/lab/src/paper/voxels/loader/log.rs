@@ -9,7 +9,6 @@ use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lattice_mapper::MapperOptions;
 use lattice_nodes::replay::RunReport;
 use lattice_nodes::replay::{self, Pipeline, Slice, TopicWishes};
-use lattice_nodes::voxel_marker_publisher::MarkerOptions;
 use std::path::Path;
 
 /// Length of the simulated log, s: that of `lattice simulate bobcat`. The paper does not say how long
@@ -37,7 +36,7 @@ pub fn replayed(path: &Path, progress: &mut dyn FnMut(f64)) -> Result<RunReport,
     let map = |kind| Ok(MapperOptions::new(Lattice::new(kind, VOLUME_M3)?));
     let maps: Result<Vec<_>, AnyError> = LatticeKind::ALL.into_iter().map(map).collect();
     let transformer = TransformerOptions::new(plan.source);
-    let mut pipeline = Pipeline::new(transformer, maps?, &MarkerOptions::default())?;
+    let mut pipeline = Pipeline::new(transformer, maps?, None)?;
     let run = replay::run(&bag, &plan, &Slice::WHOLE, &mut pipeline, "", progress);
     run.map_err(at(path))
 }
