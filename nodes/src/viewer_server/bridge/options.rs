@@ -1,4 +1,4 @@
-//! What clients may reach.
+//! Nodes and rights of clients.
 
 /// Nodes accessible to clients.
 #[derive(Clone, Debug)]
