@@ -2,10 +2,10 @@
 
 use rustc_hash::FxHashMap;
 
-use super::masks::ScanMasks;
+use super::masks::{Mask, ScanMasks};
 use super::packed::Packed;
 use super::scan::{self, RayBundle, Reach, ScanReport};
-use super::surface::Surfaces;
+use super::surface::{Probe, Surfaces};
 use super::traversal::Traversal;
 use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::VoxelStore;
@@ -52,8 +52,8 @@ pub(super) fn traversed_voxels(masks: &ScanMasks, store: &dyn VoxelStore) -> Vec
     let mut traversed = Vec::new();
     for (block, passed, hit) in masks.blocks() {
         let missed = passed.without(hit);
-        let cells = missed.places().map(|place| Packed::at(block, place));
-        traversed.extend(cells.filter(|cell| store.holds(cell.unpack())));
+        let voxels = Mask::of_voxels(store, block).and(&missed);
+        traversed.extend(voxels.places().map(|place| Packed::at(block, place)));
     }
     traversed
 }
@@ -101,12 +101,13 @@ impl RayClearer {
         let reach = self.options.reach;
         let datum_m = store.datum_m();
         let (masks, traversal) = (&mut self.masks, &self.traversal);
-        let (counts, rays) = scan::mark(traversal, masks, &datum_m, scan, reach);
-        report.scan = counts;
+        let spares = self.options.spare_touching;
+        let probe = spares.then(|| Probe::new(&mut self.surfaces, &*store));
+        report.scan = scan::mark(traversal, masks, &datum_m, scan, reach, probe);
         let mut traversed = traversed_voxels(&self.masks, store);
         let occupied = traversed.len();
-        if self.options.spare_touching {
-            traversed = (self.surfaces).passed_through(store, &self.masks, &rays, traversed);
+        if spares {
+            traversed = self.surfaces.passed().to_vec();
         }
         report.kept = (occupied - traversed.len()) as u64;
         self.forget_hits(store);

@@ -10,7 +10,7 @@ use super::free_space_options::{FreeSpaceError, FreeSpaceOptions};
 use super::masks::{Cursor, Mask, ScanMasks};
 use super::packed::Packed;
 use super::scan::{self, RayBundle, Reach, ScanReport};
-use super::surface::Surfaces;
+use super::surface::{Probe, Surfaces};
 use super::traversal::Traversal;
 use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::{DatumError, VoxelStore};
@@ -119,22 +119,23 @@ impl FreeSpaceMap {
 
     /// Adds a scan. Voxels of `store` that it grazes get no miss; they are counted in `kept`.
     fn add(&mut self, scan: &[RayBundle], store: Option<&dyn VoxelStore>) -> ClearReport {
-        let (mut report, rays) = scan::mark(
+        let mut report = scan::mark(
             &self.traversal,
             &mut self.masks,
             &self.datum_m,
             scan,
             self.options.reach,
+            store.map(|store| Probe::new(&mut self.surfaces, store)),
         );
         let mut kept = 0;
         if let Some(store) = store {
             let traversed = traversed_voxels(&self.masks, store);
             kept = traversed.len();
             traversed.iter().for_each(|cell| self.masks.spare(*cell));
-            let passed = (self.surfaces).passed_through(store, &self.masks, &rays, traversed);
+            let passed = self.surfaces.passed();
             kept -= passed.len();
             let mut cursor = Cursor::NONE;
-            (passed.into_iter()).for_each(|cell| self.masks.pass(cell, &mut cursor));
+            (passed.iter()).for_each(|cell| self.masks.pass(*cell, &mut cursor));
         }
         let missed = |(_, passed, hit): (u64, &Mask, &Mask)| -> u64 {
             let words = passed.without(hit).0;

@@ -3,6 +3,8 @@
 use std::hash::{BuildHasher, RandomState};
 
 use super::packed::Packed;
+use crate::lattice::BlockKey;
+use crate::voxels::VoxelStore;
 use crate::voxels::store::block_mask::places;
 
 /// One bit per cell of a block, one cache line.
@@ -11,6 +13,19 @@ use crate::voxels::store::block_mask::places;
 pub(super) struct Mask(pub(super) [u64; 8]);
 
 impl Mask {
+    /// Occupied cells of a store in a block.
+    pub(super) fn of_voxels(store: &dyn VoxelStore, block: u64) -> Mask {
+        let mut mask = Mask::default();
+        let Some(code) = BlockKey::pack(Packed::at(block, 0).unpack()) else {
+            return mask;
+        };
+        // Places of a block key count the last axis fastest.
+        for place in places(&store.block_mask(code.block())) {
+            mask.set(place >> 6 & 7 | place & 0o70 | (place & 7) << 6);
+        }
+        mask
+    }
+
     #[inline(always)]
     fn set(&mut self, place: usize) -> bool {
         let bit = 1 << (place & 63);
@@ -20,13 +35,23 @@ impl Mask {
         new
     }
 
-    fn remove(&mut self, place: usize) {
+    #[inline(always)]
+    pub(super) fn has(&self, place: usize) -> bool {
+        self.0[place >> 6 & 7] >> (place & 63) & 1 == 1
+    }
+
+    pub(super) fn remove(&mut self, place: usize) {
         self.0[place >> 6 & 7] &= !(1 << (place & 63));
     }
 
     /// Cells that are not in another mask.
     pub(super) fn without(&self, other: &Mask) -> Mask {
         Mask(std::array::from_fn(|word| self.0[word] & !other.0[word]))
+    }
+
+    /// Cells of both masks.
+    pub(super) fn and(&self, other: &Mask) -> Mask {
+        Mask(std::array::from_fn(|word| self.0[word] & other.0[word]))
     }
 
     /// Cells of either mask.
@@ -79,7 +104,7 @@ pub(super) struct ScanMasks {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cursor {
     block: u64,
-    slot: usize,
+    pub(super) slot: usize,
 }
 
 impl Cursor {
@@ -167,22 +192,13 @@ impl ScanMasks {
 
     pub(super) fn is_hit(&self, cell: Packed) -> bool {
         let mask = self.find(cell.block()).and_then(|slot| self.hit.get(slot));
-        let place = cell.place();
-        mask.is_some_and(|mask| mask.0[place >> 6 & 7] >> (place & 63) & 1 == 1)
+        mask.is_some_and(|mask| mask.has(cell.place()))
     }
 
-    /// As [`ScanMasks::is_hit`], faster for cells in the block of the last one.
-    #[inline(always)]
-    pub(super) fn is_hit_from(&self, cell: Packed, cursor: &mut Cursor) -> bool {
-        if cell.block() != cursor.block {
-            *cursor = Cursor {
-                block: cell.block(),
-                slot: self.find(cell.block()).unwrap_or(0),
-            };
-        }
-        let place = cell.place();
-        let mask = self.hit.get(cursor.slot).filter(|_| cursor.slot != 0);
-        mask.is_some_and(|mask| mask.0[place >> 6 & 7] >> (place & 63) & 1 == 1)
+    /// Blocks from a slot on, each with its hit cells; slot 0 has none.
+    pub(super) fn blocks_from(&self, slot: usize) -> impl Iterator<Item = (u64, &Mask)> {
+        let blocks = self.blocks.iter().zip(&self.hit).skip(slot);
+        blocks.map(|(block, hit)| (*block, hit))
     }
 
     fn find(&self, block: u64) -> Option<usize> {

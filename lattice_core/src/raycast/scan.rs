@@ -6,6 +6,7 @@ use rustc_hash::FxHashSet;
 use super::families::{Families, Origin, Ray};
 use super::masks::{Cursor, ScanMasks};
 use super::packed::Packed;
+use super::surface::Probe;
 use super::traversal::{Kernel, Outside, Traversal};
 use crate::cloud::Cloud;
 use crate::lattice::Simd;
@@ -78,17 +79,18 @@ pub(super) struct Ends {
     open: Vec<Packed>,
 }
 
-/// Marks the cells that a scan hits and traverses.
+/// Marks the cells that a scan hits and traverses, and shows `probe` the voxels that it traverses and does not hit.
 ///
 /// Rays go to the lattice points of their end cells, so the marks do not depend on the order of the points of a
 /// bundle. A cell hit by several bundles has a ray of the first.
-pub(super) fn mark<'a>(
-    traversal: &'a Traversal,
+pub(super) fn mark(
+    traversal: &Traversal,
     masks: &mut ScanMasks,
     datum_m: &Vector3<f64>,
-    scan: &[RayBundle<'a>],
+    scan: &[RayBundle<'_>],
     reach: Reach,
-) -> (ScanReport, MarkedRays<'a>) {
+    probe: Option<Probe<'_>>,
+) -> ScanReport {
     masks.clear();
     let mut report = ScanReport::default();
     let mut bundles = Vec::with_capacity(scan.len());
@@ -109,14 +111,8 @@ pub(super) fn mark<'a>(
             }),
         }
     }
-    let ends = mark_bundles(&bundles, masks, &mut report);
-    let bundles = bundles.into_iter().zip(ends).collect();
-    (report, MarkedRays { bundles })
-}
-
-/// Rays of a marked scan.
-pub(super) struct MarkedRays<'a> {
-    bundles: Vec<(Rays<'a>, Ends)>,
+    mark_bundles(&bundles, masks, probe, &mut report);
+    report
 }
 
 /// Straight line from a sensor, metres from lattice point 0.
@@ -127,35 +123,26 @@ pub(super) struct Line {
     pub(super) direction: Vector3<f64>,
 }
 
-impl MarkedRays<'_> {
-    /// Visits the cells of `wanted` that rays traverse, with the line to the point `end_m` of their end cell, metres from
-    /// lattice point 0; to its lattice point where that is `None`.
-    pub(super) fn visit(
-        &self,
-        wanted: &ScanMasks,
-        end_m: impl Fn(Packed) -> Option<Vector3<f64>>,
-        mut visit: impl FnMut(&Line, Packed),
-    ) {
-        for (rays, ends) in &self.bundles {
-            match &rays.traversal.kernel {
-                Kernel::Four(families) => rays.visit(families, ends, wanted, &end_m, &mut visit),
-                Kernel::Six(families) => rays.visit(families, ends, wanted, &end_m, &mut visit),
-                Kernel::Eight(families) => rays.visit(families, ends, wanted, &end_m, &mut visit),
-            }
-        }
-    }
-}
-
-fn mark_bundles(bundles: &[Rays], masks: &mut ScanMasks, report: &mut ScanReport) -> Vec<Ends> {
+fn mark_bundles(
+    bundles: &[Rays],
+    masks: &mut ScanMasks,
+    mut probe: Option<Probe<'_>>,
+    report: &mut ScanReport,
+) {
     let ends = |rays: &Rays| rays.ends(masks, report);
     let mut ends: Vec<Ends> = bundles.iter().map(ends).collect();
     for ends in &mut ends {
         // One ray serves both.
         ends.open.retain(|cell| !masks.is_hit(*cell));
     }
-    let follow = |masks: &mut ScanMasks, ends: &[Ends]| -> u64 {
+    let mut follow = |masks: &mut ScanMasks, ends: &[Ends]| -> u64 {
+        if let Some(probe) = &mut probe {
+            probe.clear();
+        }
         let pairs = bundles.iter().zip(ends);
-        pairs.map(|(rays, ends)| rays.follow_all(masks, ends)).sum()
+        pairs
+            .map(|(rays, ends)| rays.follow_all(masks, ends, &mut probe))
+            .sum()
     };
     report.visits = follow(masks, &ends);
     if masks.entries_refused() > 0 {
@@ -172,7 +159,6 @@ fn mark_bundles(bundles: &[Rays], masks: &mut ScanMasks, report: &mut ScanReport
     report.hits = ends.iter().map(|ends| ends.hits.len() as u64).sum();
     report.rays = report.hits + ends.iter().map(|ends| ends.open.len() as u64).sum::<u64>();
     report.entries_refused = masks.entries_refused();
-    ends
 }
 
 /// Rays of one bundle, in metres from lattice point 0.
@@ -241,63 +227,39 @@ impl Rays<'_> {
         });
     }
 
-    fn follow_all(&self, masks: &mut ScanMasks, ends: &Ends) -> u64 {
+    fn follow_all(&self, masks: &mut ScanMasks, ends: &Ends, probe: &mut Option<Probe<'_>>) -> u64 {
         #[cfg(target_arch = "x86_64")]
         if Simd::detect() == Simd::Avx2 {
             // SAFETY: AVX2 was detected.
             #[allow(unsafe_code)]
-            return unsafe { self.follow_all_avx2(masks, ends) };
+            return unsafe { self.follow_all_avx2(masks, ends, probe) };
         }
-        self.follow_all_portably(masks, ends)
+        self.follow_all_portably(masks, ends, probe)
     }
 
     /// The same code compiled for AVX2, without fused multiply-add, so that the results are bit-identical.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn follow_all_avx2(&self, masks: &mut ScanMasks, ends: &Ends) -> u64 {
-        self.follow_all_portably(masks, ends)
+    fn follow_all_avx2(
+        &self,
+        masks: &mut ScanMasks,
+        ends: &Ends,
+        probe: &mut Option<Probe<'_>>,
+    ) -> u64 {
+        self.follow_all_portably(masks, ends, probe)
     }
 
     #[inline(always)]
-    fn follow_all_portably(&self, masks: &mut ScanMasks, ends: &Ends) -> u64 {
-        match &self.traversal.kernel {
-            Kernel::Four(families) => self.follow(families, masks, ends),
-            Kernel::Six(families) => self.follow(families, masks, ends),
-            Kernel::Eight(families) => self.follow(families, masks, ends),
-        }
-    }
-
-    /// Visits the cells of `wanted` on the rays, see [`MarkedRays::visit`].
-    fn visit<const P: usize>(
+    fn follow_all_portably(
         &self,
-        families: &Families<P>,
+        masks: &mut ScanMasks,
         ends: &Ends,
-        wanted: &ScanMasks,
-        end_m: &impl Fn(Packed) -> Option<Vector3<f64>>,
-        visit: &mut impl FnMut(&Line, Packed),
-    ) {
-        let origin = self.start(families);
-        let (mut cursor, mut traversed) = (Cursor::NONE, Vec::new());
-        for end in ends.hits.iter().chain(&ends.open) {
-            let Some(mut ray) = self.ray(families, &origin, *end) else {
-                continue;
-            };
-            traversed.clear();
-            while families.step(&origin, &mut ray, |cell| {
-                if wanted.is_hit_from(cell, &mut cursor) {
-                    traversed.push(cell);
-                }
-            }) {}
-            if traversed.is_empty() {
-                continue;
-            }
-            let center = || self.traversal.lattice.center(end.unpack());
-            let to_end = end_m(*end).unwrap_or_else(center) - self.origin_m;
-            let line = Line {
-                origin_m: self.origin_m,
-                direction: to_end.normalize(),
-            };
-            traversed.iter().for_each(|cell| visit(&line, *cell));
+        probe: &mut Option<Probe<'_>>,
+    ) -> u64 {
+        match &self.traversal.kernel {
+            Kernel::Four(families) => self.follow(families, masks, ends, probe),
+            Kernel::Six(families) => self.follow(families, masks, ends, probe),
+            Kernel::Eight(families) => self.follow(families, masks, ends, probe),
         }
     }
 
@@ -337,35 +299,96 @@ impl Rays<'_> {
         families: &Families<P>,
         masks: &mut ScanMasks,
         ends: &Ends,
+        probe: &mut Option<Probe<'_>>,
     ) -> u64 {
         let origin = self.start(families);
         let ends = ends.hits.iter().chain(&ends.open);
-        let mut rays = ends.filter_map(|end| self.ray(families, &origin, *end));
-        let mut visits = 0;
-        let mut lanes: Vec<(Ray<P>, Cursor)> = rays
-            .by_ref()
-            .take(LANES)
-            .map(|ray| (ray, Cursor::NONE))
-            .collect();
-        while let Ok(full) = <&mut [(Ray<P>, Cursor); LANES]>::try_from(lanes.as_mut_slice()) {
-            let mut ended = None;
-            for (i, (ray, cursor)) in full.iter_mut().enumerate() {
-                if !families.step(&origin, ray, |cell| masks.pass(cell, cursor)) {
-                    visits += std::mem::take(&mut ray.steps);
-                    match rays.next() {
-                        Some(next) => *ray = next,
-                        None => ended = Some(i),
-                    }
+        let rays = ends.filter_map(|end| Some((self.ray(families, &origin, *end)?, *end)));
+        match probe {
+            None => step_all(families, &origin, rays, |_, _, cell, cursor| {
+                masks.pass(cell, cursor);
+            }),
+            Some(probe) => step_all(families, &origin, rays, |end, line, cell, cursor| {
+                masks.pass(cell, cursor);
+                if probe.is_open(masks, cell, cursor) {
+                    let line = line.get_or_insert_with(|| self.line(probe, end));
+                    probe.meet(masks, cell, cursor, line);
+                }
+            }),
+        }
+    }
+
+    /// Line to the mean of the voxel that a ray ends in, or to its lattice point where there is none.
+    #[inline(never)]
+    fn line(&self, probe: &Probe<'_>, end: Packed) -> Line {
+        let center = || self.traversal.lattice.center(end.unpack());
+        let to_end = probe.mean_m(end).unwrap_or_else(center) - self.origin_m;
+        Line {
+            origin_m: self.origin_m,
+            direction: to_end.normalize(),
+        }
+    }
+}
+
+/// Steps along all rays, each given with its end; `visit` gets that end, a place for what is kept of a ray, a cell, and a
+/// cursor of the ray. Returns the number of visits.
+#[inline(always)]
+fn step_all<const P: usize>(
+    families: &Families<P>,
+    origin: &Origin<P>,
+    mut rays: impl Iterator<Item = (Ray<P>, Packed)>,
+    mut visit: impl FnMut(Packed, &mut Option<Line>, Packed, &mut Cursor),
+) -> u64 {
+    let mut visits = 0;
+    let mut lanes: Vec<Lane<P>> = rays
+        .by_ref()
+        .take(LANES)
+        .map(|(ray, end)| Lane {
+            ray,
+            cursor: Cursor::NONE,
+            end,
+            line: None,
+        })
+        .collect();
+    while let Ok(full) = <&mut [Lane<P>; LANES]>::try_from(lanes.as_mut_slice()) {
+        let mut ended = None;
+        for (i, lane) in full.iter_mut().enumerate() {
+            if !lane.step(families, origin, &mut visit) {
+                visits += std::mem::take(&mut lane.ray.steps);
+                match rays.next() {
+                    Some((ray, end)) => (lane.ray, lane.end, lane.line) = (ray, end, None),
+                    None => ended = Some(i),
                 }
             }
-            if let Some(i) = ended {
-                lanes.swap_remove(i);
-            }
         }
-        for (ray, cursor) in &mut lanes {
-            while families.step(&origin, ray, |cell| masks.pass(cell, cursor)) {}
-            visits += ray.steps;
+        if let Some(i) = ended {
+            lanes.swap_remove(i);
         }
-        visits
+    }
+    for lane in &mut lanes {
+        while lane.step(families, origin, &mut visit) {}
+        visits += lane.ray.steps;
+    }
+    visits
+}
+
+/// Ray among those that are followed in turn.
+struct Lane<const P: usize> {
+    ray: Ray<P>,
+    cursor: Cursor,
+    end: Packed,
+    line: Option<Line>,
+}
+
+impl<const P: usize> Lane<P> {
+    #[inline(always)]
+    fn step(
+        &mut self,
+        families: &Families<P>,
+        origin: &Origin<P>,
+        visit: &mut impl FnMut(Packed, &mut Option<Line>, Packed, &mut Cursor),
+    ) -> bool {
+        let (end, line, cursor) = (self.end, &mut self.line, &mut self.cursor);
+        families.step(origin, &mut self.ray, |cell| visit(end, line, cell, cursor))
     }
 }

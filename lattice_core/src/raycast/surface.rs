@@ -1,11 +1,13 @@
 //! Surface of a map about one of its voxels, and rays that pass through it.
 
+use std::collections::hash_map::Entry;
+
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rustc_hash::FxHashMap;
 
-use super::masks::{Cursor, ScanMasks};
+use super::masks::{Cursor, Mask, ScanMasks};
 use super::packed::{Packed, difference};
-use super::scan::{Line, MarkedRays};
+use super::scan::Line;
 use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
 
@@ -37,54 +39,135 @@ const FLAT: f64 = 0.7;
 #[derive(Clone, Debug)]
 pub(super) struct Surfaces {
     touching: Vec<LatticeIndex>,
-    /// The voxels, as hit cells.
-    voxels: ScanMasks,
+    max_bytes: usize,
+    /// Voxels that are not hit and may yet be passed through, by slot of the scan's masks.
+    open: Vec<Mask>,
+    /// Surfaces about those that a ray has met.
+    surfaces: FxHashMap<Packed, Surface>,
+    passed: Vec<Packed>,
 }
 
 impl Surfaces {
+    /// Maximum memory of a voxel that a ray has met, bytes: a table at least 7/16 full, or a place in the list.
+    const BYTES_PER_VOXEL: usize = (size_of::<(Packed, Surface)>() + 1) * 16 / 7;
+    /// Maximum memory of a block, bytes, by the growth of a vector.
+    const BYTES_PER_BLOCK: usize = 2 * size_of::<Mask>();
+
     /// Creates a test within a limit of memory, bytes; voxels beyond it are not passed through.
     pub(super) fn new(lattice: &Lattice, max_bytes: usize) -> Surfaces {
         Surfaces {
             touching: lattice.touching_neighbors().to_vec(),
-            voxels: ScanMasks::new(max_bytes / ScanMasks::BYTES_PER_BLOCK),
+            max_bytes,
+            open: Vec::new(),
+            surfaces: FxHashMap::default(),
+            passed: Vec::new(),
         }
     }
 
     pub(super) fn bytes(&self) -> usize {
-        self.voxels.bytes()
+        self.open.capacity() * size_of::<Mask>()
+            + self.surfaces.capacity() * (size_of::<(Packed, Surface)>() + 1)
+            + self.passed.capacity() * size_of::<Packed>()
     }
 
-    /// Voxels, of the traversed ones, that the scan does not graze; in no order.
-    pub(super) fn passed_through(
-        &mut self,
-        store: &dyn VoxelStore,
-        masks: &ScanMasks,
-        rays: &MarkedRays,
-        mut traversed: Vec<Packed>,
-    ) -> Vec<Packed> {
-        traversed.retain(|cell| {
-            let mut around = (self.touching.iter()).map(|n| cell.plus(difference(*n)));
-            !around.any(|cell| masks.is_hit(cell))
-        });
-        let datum_m = store.datum_m();
-        let (mut surfaces, mut cursor) = (FxHashMap::default(), Cursor::NONE);
-        self.voxels.clear();
-        for cell in traversed {
-            if let Some(surface) = Surface::about(store, &self.touching, cell.unpack()) {
-                surfaces.insert(cell, (surface, false));
-                self.voxels.hit(cell, &mut cursor);
-            }
+    /// Voxels that the last scan passed through, in no order.
+    pub(super) fn passed(&self) -> &[Packed] {
+        &self.passed
+    }
+
+    fn is_full(&self) -> bool {
+        let voxels = self.surfaces.len() + self.passed.len();
+        let blocks = self.open.len() * Self::BYTES_PER_BLOCK;
+        voxels * Self::BYTES_PER_VOXEL + blocks >= self.max_bytes
+    }
+}
+
+/// The voxels of a store, tested while the rays of a scan are followed.
+pub(super) struct Probe<'a> {
+    surfaces: &'a mut Surfaces,
+    store: &'a dyn VoxelStore,
+    datum_m: Vector3<f64>,
+}
+
+impl<'a> Probe<'a> {
+    pub(super) fn new(surfaces: &'a mut Surfaces, store: &'a dyn VoxelStore) -> Probe<'a> {
+        Probe {
+            surfaces,
+            datum_m: store.datum_m(),
+            store,
         }
-        let end_m = |end: Packed| Some(store.mean_m(end.key()?)? - datum_m);
-        rays.visit(&self.voxels, end_m, |line, cell| {
-            if let Some((surface, is_passed)) = surfaces.get_mut(&cell) {
-                *is_passed = *is_passed || surface.is_passed_by(line);
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.surfaces.open.clear();
+        self.surfaces.surfaces.clear();
+        self.surfaces.passed.clear();
+    }
+
+    /// True for a voxel that is not hit and may yet be passed through. All hits of the scan are marked.
+    #[inline(always)]
+    pub(super) fn is_open(&mut self, masks: &ScanMasks, cell: Packed, cursor: &Cursor) -> bool {
+        if self.surfaces.open.len() <= cursor.slot {
+            self.open_blocks(masks);
+        }
+        let open = self.surfaces.open.get(cursor.slot);
+        open.is_some_and(|mask| mask.has(cell.place()))
+    }
+
+    #[inline(never)]
+    fn open_blocks(&mut self, masks: &ScanMasks) {
+        let open = &mut self.surfaces.open;
+        let first = open.len();
+        open.extend((first..).zip(masks.blocks_from(first)).map(
+            |(slot, (block, hit))| match slot {
+                // The cells of refused blocks.
+                0 => Mask::default(),
+                _ => Mask::of_voxels(self.store, block).without(hit),
+            },
+        ));
+    }
+
+    /// Mean of a voxel, metres from lattice point 0; `None` if the cell is not occupied.
+    pub(super) fn mean_m(&self, cell: Packed) -> Option<Vector3<f64>> {
+        Some(self.store.mean_m(cell.key()?)? - self.datum_m)
+    }
+
+    /// Tests a ray that traverses an open voxel, which it closes if it is passed through or will never be.
+    #[inline(never)]
+    pub(super) fn meet(&mut self, masks: &ScanMasks, cell: Packed, cursor: &Cursor, line: &Line) {
+        let is_full = self.surfaces.is_full();
+        let Surfaces {
+            touching,
+            open,
+            surfaces,
+            passed,
+            ..
+        } = &mut *self.surfaces;
+        let is_passed = match surfaces.entry(cell) {
+            Entry::Occupied(known) if known.get().is_passed_by(line) => {
+                known.remove();
+                true
             }
-        });
-        let passed = surfaces
-            .into_iter()
-            .filter(|(_, (_, is_passed))| *is_passed);
-        passed.map(|(cell, _)| cell).collect()
+            Entry::Occupied(_) => return,
+            Entry::Vacant(place) => {
+                let mut around = touching.iter().map(|n| cell.plus(difference(*n)));
+                let is_grazed = is_full || around.any(|cell| masks.is_hit(cell));
+                let about = || Surface::about(self.store, touching, cell.unpack());
+                match (!is_grazed).then(about).flatten() {
+                    Some(surface) if !surface.is_passed_by(line) => {
+                        place.insert(surface);
+                        return;
+                    }
+                    surface => surface.is_some(),
+                }
+            }
+        };
+        if is_passed {
+            passed.push(cell);
+        }
+        if let Some(mask) = open.get_mut(cursor.slot) {
+            mask.remove(cell.place());
+        }
     }
 }
 
