@@ -1,7 +1,7 @@
 //! Deskewing: transforms every point to the map frame with the pose at its own time, from record to record in one
 //! pass.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 
 use super::record::{Copies, Precision, RecordFormat, write_vector};
@@ -79,12 +79,32 @@ pub fn transform_records<E: Send>(
         lookup: |i| time_of(i).map(&map_from_sensor).transpose(),
     };
     let shared = times.is_none().then(|| map_from_sensor(stamp_ns).ok());
-    if let Some(shared) = shared.filter(|_| !view.is_empty()) {
-        return source.records(format, |_| shared.as_ref());
+    if let Some(shared) = shared.flatten().filter(|_| !view.is_empty()) {
+        return source.records(format, &Known::Shared(shared));
     }
     match times.and_then(|times| Memo::new(times, &map_from_sensor)) {
-        Some(memo) => source.records(format, |i| memo.pose(i)),
-        None => source.records(format, |_| None),
+        Some(memo) => source.records(format, &Known::Repeated(memo)),
+        None => source.records(format, &Known::Nothing),
+    }
+}
+
+/// Poses looked up before.
+enum Known {
+    /// Pose of all points.
+    Shared(Isometry3<f64>),
+    /// Poses of repeated times.
+    Repeated(Memo),
+    Nothing,
+}
+
+impl Known {
+    #[inline]
+    fn pose(&self, i: usize) -> Option<&Isometry3<f64>> {
+        match self {
+            Known::Shared(pose) => Some(pose),
+            Known::Repeated(memo) => memo.pose(i),
+            Known::Nothing => None,
+        }
     }
 }
 
@@ -112,24 +132,21 @@ impl<'a, E: Send, L> Source<'a, L>
 where
     L: Fn(usize) -> Result<Option<Isometry3<f64>>, E> + Sync,
 {
-    /// Transforms the points; `known` returns poses looked up before.
-    fn records<'p>(
-        &self,
-        format: &RecordFormat,
-        known: impl Fn(usize) -> Option<&'p Isometry3<f64>> + Sync,
-    ) -> Result<Records, E> {
+    /// Transforms the points.
+    fn records(&self, format: &RecordFormat, known: &Known) -> Result<Records, E> {
         let write = |precision: Precision| {
             let (_, bytes) = format.fields(precision);
             match precision {
-                Precision::Float32 => self.write::<false>(bytes, &known),
-                Precision::Float64 => self.write::<true>(bytes, &known),
+                Precision::Float32 => self.write::<false>(bytes, known),
+                Precision::Float64 => self.write::<true>(bytes, known),
             }
         };
         if let Some(precision) = format.precision {
             return write(precision).map(|(records, _)| records);
         }
         // The position of the sensor nearly always predicts whether some point requires double precision.
-        let pose = known(0)
+        let pose = known
+            .pose(0)
             .copied()
             .or_else(|| (self.lookup)(0).ok().flatten());
         let first = pose.map(|pose| Precision::for_point(&pose.translation.vector));
@@ -142,10 +159,10 @@ where
     }
 
     /// Records of `bytes` bytes each, and the precision that their points require.
-    fn write<'p, const IS_WIDE: bool>(
+    fn write<const IS_WIDE: bool>(
         &self,
         bytes: usize,
-        known: &(impl Fn(usize) -> Option<&'p Isometry3<f64>> + Sync),
+        known: &Known,
     ) -> Result<(Records, Precision), E> {
         let points = self.view.len();
         let threads = rayon::current_num_threads();
@@ -190,54 +207,167 @@ where
     }
 
     /// Writes the records of the points from `first` on to `out`, which has space for all.
-    fn write_part<'p, const IS_WIDE: bool>(
+    fn write_part<const IS_WIDE: bool>(
         &self,
         first: usize,
         bytes: usize,
         out: &mut [u8],
-        known: &impl Fn(usize) -> Option<&'p Isometry3<f64>>,
+        known: &Known,
     ) -> Result<Counts, E> {
-        let range = self.range;
-        let indices = first..first + out.len() / bytes;
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: AVX2 was detected.
+            #[allow(unsafe_code)]
+            return unsafe { self.write_part_avx2::<IS_WIDE>(first, bytes, out, known) };
+        }
+        self.write_blocks::<IS_WIDE>(first, bytes, out, known)
+    }
+
+    /// [`Self::write_blocks`] with 256-bit vectors: the same operations in the same order, hence the same bits.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn write_part_avx2<const IS_WIDE: bool>(
+        &self,
+        first: usize,
+        bytes: usize,
+        out: &mut [u8],
+        known: &Known,
+    ) -> Result<Counts, E> {
+        self.write_blocks::<IS_WIDE>(first, bytes, out, known)
+    }
+
+    #[inline(always)]
+    fn write_blocks<const IS_WIDE: bool>(
+        &self,
+        first: usize,
+        bytes: usize,
+        out: &mut [u8],
+        known: &Known,
+    ) -> Result<Counts, E> {
+        let end = first + out.len() / bytes;
         let mut counts = Counts::default();
         let mut places = out.chunks_exact_mut(bytes);
-        for i in indices {
-            let record = self.view.record(i);
-            let p = self.view.xyz_of(record);
-            let distance_m = p.norm();
-            if !distance_m.is_finite() {
-                counts.not_finite += 1;
-                continue;
-            }
-            if !(distance_m > range.min_range_m && distance_m <= range.max_range_m) {
-                counts.out_of_range += 1;
-                continue;
-            }
-            let looked_up;
-            let pose = match known(i) {
-                Some(pose) => pose,
-                None => {
-                    let Some(pose) = (self.lookup)(i)? else {
-                        counts.no_time += 1;
+        let mut block = Block::default();
+        if let Known::Shared(pose) = known {
+            (0..LANES).for_each(|lane| block.set_pose(lane, pose));
+        }
+        for start in (first..end).step_by(LANES) {
+            let lanes = LANES.min(end - start);
+            self.view.read(start, lanes, &mut block.points_m);
+            block.measure();
+            let mut kept = block.kept(lanes, self.range, &mut counts);
+            if !matches!(known, Known::Shared(_)) {
+                for lane in 0..lanes {
+                    if kept & (1 << lane) == 0 {
                         continue;
-                    };
-                    looked_up = pose;
-                    &looked_up
+                    }
+                    let i = start + lane;
+                    if let Some(pose) = known.pose(i) {
+                        block.set_pose(lane, pose);
+                    } else if let Some(pose) = (self.lookup)(i)? {
+                        block.set_pose(lane, &pose);
+                    } else {
+                        counts.no_time += 1;
+                        kept &= !(1 << lane);
+                    }
                 }
-            };
-            let moved = (pose * Point3::from(p)).coords;
-            counts.is_far |= Precision::for_point(&moved) == Precision::Float64;
-            let Some(place) = places.next() else {
-                break;
-            };
-            let further = write_vector::<IS_WIDE>(&moved, place);
-            let further = self.copies.write(record, further);
-            if self.with_viewpoints {
-                write_vector::<IS_WIDE>(&pose.translation.vector, further);
             }
-            counts.kept += 1;
+            block.transform();
+            for (lane, place) in (0..lanes)
+                .filter(|lane| kept & (1 << lane) != 0)
+                .zip(&mut places)
+            {
+                let moved = at(&block.moved_m, lane);
+                counts.is_far |= Precision::for_point(&moved) == Precision::Float64;
+                let further = write_vector::<IS_WIDE>(&moved, place);
+                let further = self.copies.write(self.view, start + lane, further);
+                if self.with_viewpoints {
+                    write_vector::<IS_WIDE>(&at(&block.translation_m, lane), further);
+                }
+                counts.kept += 1;
+            }
         }
         Ok(counts)
+    }
+}
+
+/// Points of a block.
+pub(super) const LANES: usize = 16;
+
+/// One number of each point of a block.
+pub(super) type Lanes = [f64; LANES];
+
+#[inline(always)]
+fn at(vectors: &[Lanes; 3], lane: usize) -> Vector3<f64> {
+    Vector3::from(vectors.map(|lanes| lanes.get(lane).copied().unwrap_or(f64::NAN)))
+}
+
+/// Points that are transformed together, each by its own pose; vectorized by the compiler.
+#[derive(Default)]
+struct Block {
+    points_m: [Lanes; 3],
+    distances_m: Lanes,
+    /// Vector part and scalar of the rotation.
+    rotation: [Lanes; 4],
+    translation_m: [Lanes; 3],
+    moved_m: [Lanes; 3],
+}
+
+impl Block {
+    #[inline(always)]
+    fn set_pose(&mut self, lane: usize, pose: &Isometry3<f64>) {
+        let [i, j, k, w] = pose.rotation.coords.into();
+        for (lanes, value) in self.rotation.iter_mut().zip([i, j, k, w]) {
+            lanes[lane % LANES] = value;
+        }
+        for (lanes, value) in self.translation_m.iter_mut().zip(&pose.translation.vector) {
+            lanes[lane % LANES] = *value;
+        }
+    }
+
+    /// Distances of the points from the sensor.
+    #[inline(always)]
+    fn measure(&mut self) {
+        let [x, y, z] = &self.points_m;
+        for lane in 0..LANES {
+            let squared = x[lane] * x[lane] + y[lane] * y[lane] + z[lane] * z[lane];
+            self.distances_m[lane] = squared.sqrt();
+        }
+    }
+
+    /// Bits of the first `lanes` points that are finite and in range; the others are counted.
+    #[inline(always)]
+    fn kept(&self, lanes: usize, range: &RangeLimits, counts: &mut Counts) -> u32 {
+        let (mut finite, mut kept) = (0_u32, 0_u32);
+        for lane in 0..LANES {
+            let distance_m = self.distances_m[lane];
+            let in_range = distance_m > range.min_range_m && distance_m <= range.max_range_m;
+            finite |= u32::from(distance_m.is_finite()) << lane;
+            kept |= u32::from(distance_m.is_finite() && in_range) << lane;
+        }
+        let there = (1 << lanes) - 1;
+        counts.not_finite += (there & !finite).count_ones() as usize;
+        counts.out_of_range += (there & finite & !kept).count_ones() as usize;
+        kept & there
+    }
+
+    /// Rotates and moves the points: the product of nalgebra's isometry and point, operation by operation.
+    #[inline(always)]
+    fn transform(&mut self) {
+        let [x, y, z] = &self.points_m;
+        let [i, j, k, w] = &self.rotation;
+        let [dx, dy, dz] = &self.translation_m;
+        let [mx, my, mz] = &mut self.moved_m;
+        for lane in 0..LANES {
+            let (x, y, z) = (x[lane], y[lane], z[lane]);
+            let (i, j, k, w) = (i[lane], j[lane], k[lane], w[lane]);
+            let tx = (j * z - k * y) * 2.0;
+            let ty = (k * x - i * z) * 2.0;
+            let tz = (i * y - j * x) * 2.0;
+            mx[lane] = tx * w + (j * tz - k * ty) + x + dx[lane];
+            my[lane] = ty * w + (k * tx - i * tz) + y + dy[lane];
+            mz[lane] = tz * w + (i * ty - j * tx) + z + dz[lane];
+        }
     }
 }
 

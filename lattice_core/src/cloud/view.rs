@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::coordinates::Coordinates;
+use super::transform::{LANES, Lanes};
 use super::{CloudError, CloudLayout, CloudLimits, Datatype, PointField};
 
 /// View of a validated cloud: points by index, row by row, without copying.
@@ -94,6 +95,54 @@ impl<'a> CloudView<'a> {
         Vector3::new(at(x), at(y), at(z))
     }
 
+    /// Reads the coordinates of `lanes` points from `first` on, metres; the lanes behind them keep what they hold.
+    #[inline(always)]
+    pub(super) fn read(&self, first: usize, lanes: usize, out: &mut [Lanes; 3]) {
+        let [x, y, z] = out;
+        let step = self.point_step;
+        let [at, ..] = self.coordinates.offsets;
+        let records = self
+            .data
+            .get(first.saturating_mul(step).saturating_add(at)..);
+        if let Some(records) = records.filter(|_| self.is_plain() && first + lanes <= self.points) {
+            for lane in 0..lanes.min(LANES) {
+                let record = records.get(lane * step..);
+                let Some([a, b, c]) = record.and_then(<[u8]>::first_chunk::<12>).map(floats) else {
+                    break;
+                };
+                (x[lane], y[lane], z[lane]) = (f64::from(a), f64::from(b), f64::from(c));
+            }
+            return;
+        }
+        for lane in 0..lanes.min(LANES) {
+            [x[lane], y[lane], z[lane]] = self.xyz(first + lane).into();
+        }
+    }
+
+    /// True if points follow each other without gaps between rows, and have consecutive little-endian `f32` coordinates.
+    #[inline]
+    fn is_plain(&self) -> bool {
+        let [x, y, z] = self.coordinates.offsets;
+        let is_consecutive = y == x + 4 && z == x + 8;
+        let is_little = !self.big_endian && !self.coordinates.wide;
+        is_consecutive && is_little && self.row_step == self.width * self.point_step
+    }
+
+    /// All points as stored, metres in the frame of the cloud; `None` if their coordinates are not `f32`.
+    pub fn single_points(&self) -> Option<Vec<[f32; 3]>> {
+        if self.coordinates.wide {
+            return None;
+        }
+        let [at, ..] = self.coordinates.offsets;
+        if self.is_plain() && self.point_step > 0 {
+            let records = self.data.chunks(self.point_step).take(self.points);
+            let point = |record: &[u8]| record.get(at..)?.first_chunk::<12>().map(floats);
+            return records.map(point).collect();
+        }
+        let point = |i| <[f64; 3]>::from(self.xyz(i)).map(|v| v as f32);
+        Some((0..self.points).map(point).collect())
+    }
+
     pub(super) fn is_big_endian(&self) -> bool {
         self.big_endian
     }
@@ -164,6 +213,12 @@ impl<'a> CloudView<'a> {
             (i / self.width) * self.row_step + (i % self.width) * self.point_step
         }
     }
+}
+
+#[inline(always)]
+fn floats(bytes: &[u8; 12]) -> [f32; 3] {
+    let [a, b, c, d, e, f, g, h, i, j, k, l] = *bytes;
+    [[a, b, c, d], [e, f, g, h], [i, j, k, l]].map(f32::from_le_bytes)
 }
 
 /// Number of `N` bytes at an offset of a record; NaN beyond its end.

@@ -1,7 +1,9 @@
 //! Conversion between PointCloud2 and the core's clouds.
 
 pub use lattice_core::cloud::Precision;
-use lattice_core::cloud::{Cloud, CloudError, CloudLayout, CloudLimits, LayoutNote, PointField};
+use lattice_core::cloud::{
+    Cloud, CloudError, CloudLayout, CloudLimits, CloudView, LayoutNote, PointField,
+};
 use lattice_msgs::sensor_msgs::{self, PointCloud2};
 use lattice_msgs::std_msgs::Header;
 use nalgebra::Vector3;
@@ -125,25 +127,30 @@ pub fn cloud_from_message(
 ) -> Result<Cloud, CloudError> {
     let layout = layout_of(cloud);
     let view = layout.view(&cloud.data, limits)?;
-    let points = (0..view.len()).map(|i| view.xyz(i));
-    let is_double = sensor_msgs::PointField::FLOAT64;
-    let mut fields = cloud.fields.iter();
-    let wide = fields.any(|field| field.name == "x" && field.datatype == is_double);
-    let finite = points.clone().filter(|p| p.iter().all(|v| v.is_finite()));
-    let by_distance = |a: &Vector3<f64>, b: &Vector3<f64>| {
-        let [a, b] = [a, b].map(|p| (p - near_m).norm_squared());
-        a.total_cmp(&b)
+    let (datum_m, offsets_m) = match view.single_points() {
+        Some(offsets_m) => (Vector3::zeros(), offsets_m),
+        None => near_offsets(&view, near_m),
     };
-    let nearest = wide.then(|| finite.min_by(by_distance)).flatten();
-    let tile = |v: f64| (v / DATUM_TILE_M).round() * DATUM_TILE_M;
-    let datum_m = nearest.map_or_else(Vector3::zeros, |p| p.map(tile));
-    let offset = |p: Vector3<f64>| -> [f32; 3] { (p - datum_m).map(|v| v as f32).into() };
-    let offsets_m = points.map(offset).collect();
     Ok(Cloud {
         stamp_ns: cloud.header.stamp.to_ns(),
         datum_m,
         offsets_m,
     })
+}
+
+/// Datum near the point closest to `near_m`, and offsets of all points from it.
+fn near_offsets(view: &CloudView<'_>, near_m: &Vector3<f64>) -> (Vector3<f64>, Vec<[f32; 3]>) {
+    let points = (0..view.len()).map(|i| view.xyz(i));
+    let finite = points.clone().filter(|p| p.iter().all(|v| v.is_finite()));
+    let by_distance = |a: &Vector3<f64>, b: &Vector3<f64>| {
+        let [a, b] = [a, b].map(|p| (p - near_m).norm_squared());
+        a.total_cmp(&b)
+    };
+    let tile = |v: f64| (v / DATUM_TILE_M).round() * DATUM_TILE_M;
+    let nearest = finite.min_by(by_distance);
+    let datum_m = nearest.map_or_else(Vector3::zeros, |p| p.map(tile));
+    let offset = |p: Vector3<f64>| -> [f32; 3] { (p - datum_m).map(|v| v as f32).into() };
+    (datum_m, points.map(offset).collect())
 }
 
 #[cfg(test)]
