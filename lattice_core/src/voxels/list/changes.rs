@@ -2,7 +2,7 @@
 
 use super::VoxelList;
 use crate::lattice::{BlockKey, MortonKey};
-use crate::voxels::store::shard::Life;
+use crate::voxels::store::shard::{Life, Shard};
 
 /// Keys that differ from an earlier state, sorted.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
@@ -23,26 +23,28 @@ impl VoxelList {
     ///
     /// The memory is bounded by the number of voxels at that call.
     pub fn take_changes(&mut self) -> Changes {
-        let changes = self.changes_since(self.taken);
+        let changes = self.changes();
         self.taken = self.sequence;
         for shard in &mut self.shards {
             shard.removed.clear();
+            shard.touched.take(self.taken);
         }
         changes
     }
 
-    fn changes_since(&self, sequence: u32) -> Changes {
+    fn changes(&self) -> Changes {
+        let taken = self.taken;
         let shards = || self.shards.iter();
-        let changed = shards().flat_map(|shard| shard.iter());
-        let changed = changed.filter(|(_, entry)| entry.life.touched > sequence);
-        let mut changed: Vec<MortonKey> = changed.filter_map(|(code, _)| code.key()).collect();
-        let known = |life: &Life| life.born <= sequence && life.touched > sequence;
+        let changed = shards().flat_map(Shard::changed);
+        let mut changed: Vec<MortonKey> = changed.filter_map(BlockKey::key).collect();
+        let known = |life: &Life| life.born <= taken && life.touched > taken;
         let removed = shards().flat_map(|shard| shard.removed.iter());
         let mut removed: Vec<MortonKey> = removed
             .filter(|(_, life)| known(life))
             .filter_map(|(code, _)| BlockKey::from_raw(*code)?.key())
             .collect();
         changed.sort_unstable();
+        changed.dedup();
         removed.sort_unstable();
         Changes { changed, removed }
     }
@@ -69,6 +71,7 @@ impl VoxelList {
             for life in lives.chain(shard.removed.values_mut()) {
                 (life.born, life.touched) = (new(life.born), new(life.touched));
             }
+            shard.touched.renumber();
         }
         (self.taken, self.sequence) = (0, 1);
     }

@@ -20,7 +20,7 @@ use super::distortion::{Distortion, DistortionSums};
 use super::store::fixed_point::reach;
 use super::store::growth;
 use super::store::payload_columns::{Columns, Details, LabelCount, Payload, Stamps};
-use super::store::shard::{Life, SHARDS, Shard, shard_of};
+use super::store::shard::{BATCH, Life, SHARDS, Shard, shard_of};
 use super::{Region, Voxel, VoxelStore};
 use crate::cloud::Cloud;
 use crate::lattice::{BlockKey, Lattice, LatticeIndex, MortonKey};
@@ -143,6 +143,34 @@ impl VoxelList {
         let shard = self.shard(code)?;
         let (_, entry) = shard.get(code)?;
         Some(shard.voxel(code, entry))
+    }
+
+    /// Voxels of cells, in the order of the keys; without points where a cell is not occupied.
+    ///
+    /// Cells are read in stages, so that the cache misses of one stage overlap.
+    pub fn get_all(&self, keys: &[MortonKey]) -> Vec<Voxel> {
+        let mut voxels = Vec::with_capacity(keys.len());
+        for keys in keys.chunks(BATCH) {
+            let mut places = [None; BATCH];
+            for (place, key) in places.iter_mut().zip(keys) {
+                let code = BlockKey::from(*key);
+                let shard = self.shard(code);
+                *place = shard.and_then(|shard| Some((shard, code, shard.voxels.block_of(code)?)));
+            }
+            for place in places.iter_mut().take(keys.len()) {
+                *place = place.and_then(|(shard, code, block)| {
+                    Some((shard, code, shard.voxels.find_in(block, code)?))
+                });
+            }
+            voxels.extend(places.iter().take(keys.len()).map(|place| {
+                let entry = place.and_then(|(shard, code, number)| {
+                    let entry = shard.voxels.rows().get(number as usize)?;
+                    Some(shard.voxel(code, entry))
+                });
+                entry.unwrap_or_default()
+            }));
+        }
+        voxels
     }
 
     /// Tests whether a cell is occupied.

@@ -7,6 +7,7 @@
 //! - [`cell_table`] finds the row of a cell by its block ([`block_mask`] for its occupied cells, [`hash_table`] for
 //!   the block).
 //! - [`payload_columns`] holds the optional columns.
+//! - [`touched`] lists the voxels that changed since their changes were taken.
 //! - [`wide_sums`] holds sums that do not fit a row.
 //! - [`growth`] controls the growth of vectors.
 
@@ -19,4 +20,5 @@ pub(crate) mod hash_table;
 pub(super) mod payload_columns;
 pub(super) mod point_gather;
 pub(super) mod shard;
+mod touched;
 mod wide_sums;

@@ -1,6 +1,6 @@
 //! Part of a voxel list that one thread fills.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::block_mask::BlockMask;
 use super::cell_table::CellTable;
@@ -9,6 +9,7 @@ use super::fixed_point::{Offsets, Point, most_points, offsets_of, points_of, vox
 use super::hash_table::Place;
 use super::payload_columns::Columns;
 use super::point_gather::Partial;
+use super::touched::Touched;
 use super::wide_sums::WideSums;
 use crate::lattice::{BlockKey, Lattice};
 use crate::voxels::Voxel;
@@ -27,6 +28,7 @@ pub(crate) struct Shard {
     lattice: Lattice,
     most_points: u32,
     wide: WideSums,
+    pub(crate) touched: Touched,
     /// Removed voxels: states in which they were added and removed.
     pub(crate) removed: FxHashMap<u64, Life>,
 }
@@ -39,9 +41,11 @@ pub(crate) fn shard_of(code: BlockKey) -> usize {
 
 impl Shard {
     /// Maximum bytes per voxel, including its columns and its record after removal.
-    pub(crate) const VOXEL_BYTES: usize = CellTable::VOXEL_BYTES + WideSums::ROW_BYTES;
+    pub(crate) const VOXEL_BYTES: usize =
+        CellTable::VOXEL_BYTES + WideSums::ROW_BYTES + Touched::VOXEL_BYTES;
     /// Maximum bytes besides voxels.
-    pub(crate) const FIRST_BYTES: usize = CellTable::FIRST_BYTES + WideSums::FIRST_BYTES;
+    pub(crate) const FIRST_BYTES: usize =
+        CellTable::FIRST_BYTES + WideSums::FIRST_BYTES + Touched::FIRST_BYTES;
 
     pub(crate) fn new(lattice: &Lattice, columns: Columns) -> Shard {
         Shard {
@@ -50,6 +54,7 @@ impl Shard {
             lattice: lattice.clone(),
             most_points: most_points(lattice),
             wide: WideSums::new(),
+            touched: Touched::default(),
             removed: FxHashMap::default(),
         }
     }
@@ -62,6 +67,7 @@ impl Shard {
         self.voxels.bytes()
             + self.columns.bytes()
             + self.wide.bytes()
+            + self.touched.bytes()
             + self.removed.capacity() * (size_of::<(u64, Life)>() + 1)
     }
 
@@ -95,6 +101,7 @@ impl Shard {
                     self.columns.push();
                 }
                 self.remember(code.raw(), number);
+                self.touched.list(number, self.voxels.len());
                 Some(number)
             }
         }
@@ -116,9 +123,11 @@ impl Shard {
     /// Adds up to [`most_points`] to a voxel.
     #[inline(always)]
     pub(crate) fn add(&mut self, number: u32, points: &Point, now: u32) {
+        let voxels = self.voxels.len();
         let Some(entry) = self.voxels.row_mut(number) else {
             return;
         };
+        self.touched.note(number, entry.life.touched, voxels);
         entry.life.touched = now;
         if entry.count().saturating_add(points.as_array()[3]) > self.most_points {
             self.add_wide(number, |lattice, code| offsets_of(lattice, code, points));
@@ -129,12 +138,14 @@ impl Shard {
 
     /// Adds any number of points to a voxel.
     pub(crate) fn add_offsets(&mut self, number: u32, offsets: &Offsets, now: u32) {
+        let voxels = self.voxels.len();
         match self.voxels.row_mut(number) {
             Some(entry) if offsets[3] <= i64::from(self.most_points) => {
                 let code = BlockKey::from_raw(entry.code).unwrap_or(BlockKey::NONE);
                 self.add(number, &points_of(&self.lattice, code, offsets), now);
             }
             Some(entry) => {
+                self.touched.note(number, entry.life.touched, voxels);
                 entry.life.touched = now;
                 self.add_wide(number, |_, _| *offsets);
             }
@@ -226,6 +237,11 @@ impl Shard {
             self.wide.free(entry.wide());
         }
         self.columns.swap_remove(number as usize);
+        // The last voxel has this index now.
+        let moved = self.voxels.rows().get(number as usize);
+        if moved.is_some_and(|moved| self.touched.is_new(moved.life.touched)) {
+            self.touched.list(number, self.voxels.len());
+        }
         self.removed.insert(code.raw(), entry.life.ended(now));
         true
     }
@@ -240,6 +256,20 @@ impl Shard {
         self.columns.clear();
     }
 
+    /// Cells that changed since the changes were last taken, in no order, some more than once.
+    pub(crate) fn changed(&self) -> Vec<BlockKey> {
+        let rows = self.voxels.rows();
+        let is_changed = |entry: &&Entry| self.touched.is_new(entry.life.touched);
+        let code = |entry: &Entry| BlockKey::from_raw(entry.code);
+        match self.touched.numbers() {
+            Some(numbers) => {
+                let listed = numbers.iter().filter_map(|i| rows.get(*i as usize));
+                listed.filter(is_changed).filter_map(code).collect()
+            }
+            None => rows.iter().filter(is_changed).filter_map(code).collect(),
+        }
+    }
+
     /// Every voxel with its cell.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (BlockKey, &Entry)> {
         let rows = self.voxels.rows().iter();
@@ -252,6 +282,13 @@ impl Shard {
             return Err("the columns of a shard differ in length".to_owned());
         }
         let rows = || self.voxels.rows().iter();
+        if let Some(listed) = self.touched.numbers() {
+            let listed: FxHashSet<u32> = listed.iter().copied().collect();
+            let mut numbered = (0..).zip(rows());
+            if numbered.any(|(i, e)| self.touched.is_new(e.life.touched) && !listed.contains(&i)) {
+                return Err("a changed voxel is not listed".to_owned());
+            }
+        }
         let is_wide = |entry: &&Entry| entry.count() > self.most_points;
         if rows().filter(is_wide).count() != self.wide.used() {
             return Err("sums of many points are lost or belong to no voxel".to_owned());

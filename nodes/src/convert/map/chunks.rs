@@ -28,8 +28,7 @@ struct Payloads {
 
 impl Payloads {
     fn of(list: &VoxelList, keys: &[MortonKey]) -> Self {
-        let voxel = |key: &MortonKey| list.get(*key).unwrap_or_default();
-        let voxels: Vec<Voxel> = keys.iter().map(voxel).collect();
+        let voxels = list.get_all(keys);
         let (labels, label_counts) = labels_of(list, keys);
         Self {
             counts: voxels.iter().map(|voxel| voxel.count).collect(),
