@@ -70,22 +70,32 @@ impl<E: Send + 'static> Compute<E> {
             threads => threads,
         };
         let prefix = name.to_owned();
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(move |i| format!("{prefix} pool {i}"))
-            .build()
-            .map_err(io::Error::other)?;
+        // The compute thread is one of the pool: no event is handed to another thread and waited for.
+        let pool = move || {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            let pool = pool.thread_name(move |i| format!("{prefix} pool {i}"));
+            pool.use_current_thread().build().map_err(io::Error::other)
+        };
         let (sender, receiver) = bounded::<Item<E>>(limits.events.max(1));
         let bytes = Arc::new(AtomicUsize::new(0));
         let in_flight = Arc::clone(&bytes);
         let dropped = Arc::new(AtomicBool::new(false));
         let stop = Arc::clone(&dropped);
         let (running, ended) = bounded::<()>(0);
+        let (started, is_started) = bounded::<io::Result<()>>(1);
         let thread = thread::Builder::new()
             .name(format!("{name} compute"))
             .spawn(move || {
                 let _running = running;
                 let mut handler = handler;
+                let pool = match pool() {
+                    Ok(pool) => pool,
+                    Err(error) => {
+                        let _ = started.send(Err(error));
+                        return;
+                    }
+                };
+                let _ = started.send(Ok(()));
                 run_catching_panics("compute", &shutdown, || {
                     while let Ok(Some((event, size))) = receiver.recv() {
                         if stop.load(Ordering::Acquire) {
@@ -96,6 +106,7 @@ impl<E: Send + 'static> Compute<E> {
                     }
                 });
             })?;
+        is_started.recv().map_err(io::Error::other)??;
         Ok(Self {
             inbox: Inbox {
                 sender,
