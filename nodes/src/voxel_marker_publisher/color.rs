@@ -4,10 +4,14 @@ use lattice_msgs::std_msgs::ColorRGBA;
 
 /// Colour of a height: hues run through once every `period_m`.
 pub fn of_height(z_m: f64, period_m: f64, alpha: f32) -> ColorRGBA {
-    let turn = (z_m / period_m).rem_euclid(1.0);
+    let turns = z_m / period_m;
+    // The part behind the point, as the remainders of divisions by 1, without the division.
+    let rest = turns - turns.trunc();
+    let turn = if rest < 0.0 { rest + 1.0 } else { rest };
     let hue = 6.0 * if turn.is_finite() { turn } else { 0.0 };
     let channel = |shift: f64| {
-        let k = (hue + shift).rem_euclid(6.0);
+        let k = hue + shift;
+        let k = if k < 6.0 { k } else { k - 6.0 };
         let ramp = (k - 3.0).abs() - 1.0;
         (0.15 + 0.8 * ramp.clamp(0.0, 1.0)) as f32
     };

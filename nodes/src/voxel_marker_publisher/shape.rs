@@ -29,22 +29,40 @@ pub fn of_block(
         builder.rotation = map.lattice.orientation();
     }
     let cell = map.lattice.cell();
+    let mut corners = Vec::new();
     for key in blocks.keys(block) {
         let center_m = map.center_m(key);
-        let mut exposed = cell.faces.iter().filter(|face| {
-            offset(key, &face.neighbor).is_none_or(|neighbor| !blocks.contains(neighbor))
-        });
-        if style == MarkerStyle::Cells {
-            for face in exposed {
-                let corner = |&i: &u16| Some(center_m + cell.vertices.get(usize::from(i))?);
-                let corners: Vec<_> = face.vertices.iter().filter_map(corner).collect();
-                builder.polygon(&corners);
-            }
-        } else if exposed.next().is_some() {
+        let mut exposed = (cell.faces.iter())
+            .filter(|face| {
+                offset(key, &face.neighbor).is_none_or(|neighbor| !blocks.contains(neighbor))
+            })
+            .peekable();
+        if exposed.peek().is_none() {
+            continue;
+        }
+        if style != MarkerStyle::Cells {
             builder.point(&center_m);
+            continue;
+        }
+        // Faces share their corners.
+        corners.clear();
+        corners.extend(
+            cell.vertices
+                .iter()
+                .map(|v| builder.corner(&(center_m + v))),
+        );
+        for face in exposed {
+            builder.polygon((face.vertices.iter()).filter_map(|i| corners.get(usize::from(*i))));
         }
     }
     builder.finish()
+}
+
+/// Point of a marker.
+struct Corner {
+    point: Point,
+    /// None for markers of one colour.
+    color: Option<ColorRGBA>,
 }
 
 /// Collects points into markers of bounded size.
@@ -83,19 +101,22 @@ impl<'a> Builder<'a> {
     }
 
     /// Adds a convex polygon as a triangle fan.
-    fn polygon(&mut self, corners: &[Vector3<f64>]) {
-        let [apex, rest @ ..] = corners else { return };
-        self.make_room(3 * rest.len().saturating_sub(1));
-        for edge in rest.windows(2) {
-            for corner in std::iter::once(apex).chain(edge) {
+    fn polygon<'c>(&mut self, mut corners: impl Iterator<Item = &'c Corner> + Clone) {
+        self.make_room(3 * corners.clone().count().saturating_sub(2));
+        let (Some(apex), Some(mut before)) = (corners.next(), corners.next()) else {
+            return;
+        };
+        for corner in corners {
+            for corner in [apex, before, corner] {
                 self.push(corner);
             }
+            before = corner;
         }
     }
 
     fn point(&mut self, at_m: &Vector3<f64>) {
         self.make_room(1);
-        self.push(at_m);
+        self.push(&self.corner(at_m));
     }
 
     fn make_room(&mut self, points: usize) {
@@ -104,16 +125,21 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn push(&mut self, at_m: &Vector3<f64>) {
+    fn corner(&self, at_m: &Vector3<f64>) -> Corner {
         let p = self.rotation.inverse() * (at_m - self.origin_m);
-        self.points.push(Point {
-            x: p.x,
-            y: p.y,
-            z: p.z,
-        });
-        if self.options.color_by == ColorBy::Height {
-            self.colors.push(self.color(at_m.z));
+        Corner {
+            point: Point {
+                x: p.x,
+                y: p.y,
+                z: p.z,
+            },
+            color: (self.options.color_by == ColorBy::Height).then(|| self.color(at_m.z)),
         }
+    }
+
+    fn push(&mut self, corner: &Corner) {
+        self.points.push(corner.point.clone());
+        self.colors.extend(corner.color.clone());
     }
 
     fn color(&self, z_m: f64) -> ColorRGBA {
