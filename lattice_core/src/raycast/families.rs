@@ -105,28 +105,25 @@ impl<const P: usize> Families<P> {
         walk
     }
 
-    /// One step of a ray: visits the cell that it leaves before `t = 1`; false at its end.
+    /// One step of a ray: the cell that it leaves before `t = 1`; `None` at its end.
     ///
     /// Several rays are interleaved, since each step of one depends on the one before.
     #[inline(always)]
-    pub(super) fn step(
-        &self,
-        origin: &Origin<P>,
-        ray: &mut Ray<P>,
-        visit: impl FnOnce(Packed),
-    ) -> bool {
+    pub(super) fn step(&self, origin: &Origin<P>, ray: &mut Ray<P>) -> Option<Packed> {
         let t = ray.walk.next_exit();
         if t >= LAST {
-            return false;
+            return None;
         }
-        visit(ray.walk.cell);
+        let left = ray.walk.cell;
         self.cross(&mut ray.walk, t);
         ray.steps += 1;
         if ray.steps.is_multiple_of(ANCHOR_STEPS) {
             self.anchor(origin, &mut ray.walk);
-            return ray.steps < ray.limit;
+            if ray.steps >= ray.limit {
+                ray.walk.end();
+            }
         }
-        true
+        Some(left)
     }
 
     /// Crosses the face whose tag `t` carries.
@@ -183,6 +180,11 @@ pub(super) struct Ray<const P: usize> {
 }
 
 impl<const P: usize> Walk<P> {
+    /// Leaves no face to be crossed.
+    fn end(&mut self) {
+        (self.q, self.inverse) = ([NEVER; P], [1.0; P]);
+    }
+
     /// Parameter at which the ray leaves its cell; its low bits are the face index.
     #[inline(always)]
     fn next_exit(&self) -> f64 {

@@ -110,6 +110,11 @@ pub(super) struct Cursor {
 impl Cursor {
     /// No block: the low bits of a block are zero.
     pub(super) const NONE: Cursor = Cursor { block: 1, slot: 0 };
+
+    #[inline(always)]
+    pub(super) fn is_in_block_of(&self, cell: Packed) -> bool {
+        cell.block() == self.block
+    }
 }
 
 impl ScanMasks {
@@ -164,7 +169,7 @@ impl ScanMasks {
 
     #[inline(always)]
     pub(super) fn pass(&mut self, cell: Packed, cursor: &mut Cursor) {
-        if cell.block() != cursor.block {
+        if !cursor.is_in_block_of(cell) {
             *cursor = self.enter(cell.block());
         }
         if let Some(mask) = self.passed.get_mut(cursor.slot) {
@@ -183,7 +188,7 @@ impl ScanMasks {
     /// Marks a cell as hit; true if it was not yet, or if its block is refused.
     #[inline]
     pub(super) fn hit(&mut self, cell: Packed, cursor: &mut Cursor) -> bool {
-        if cell.block() != cursor.block {
+        if !cursor.is_in_block_of(cell) {
             *cursor = self.enter(cell.block());
         }
         let new = self.hit.get_mut(cursor.slot);
@@ -216,9 +221,9 @@ impl ScanMasks {
         }
     }
 
-    /// Slot of a block, created if missing.
-    #[inline]
-    fn enter(&mut self, block: u64) -> Cursor {
+    /// Slot of a block, created if missing. Kept out of the inner loop, which is compiled into its caller then.
+    #[inline(never)]
+    pub(super) fn enter(&mut self, block: u64) -> Cursor {
         let mask = self.table.len() - 1;
         let mut at = spread(block, self.multiplier, self.bits);
         while let Some(entry) = self.table.get(at) {

@@ -305,21 +305,19 @@ impl Rays<'_> {
         let ends = ends.hits.iter().chain(&ends.open);
         let rays = ends.filter_map(|end| Some((self.ray(families, &origin, *end)?, *end)));
         match probe {
-            None => step_all(families, &origin, rays, |_, _, cell, cursor| {
-                masks.pass(cell, cursor);
-            }),
-            Some(probe) => step_all(families, &origin, rays, |end, line, cell, cursor| {
-                masks.pass(cell, cursor);
-                if probe.is_open(masks, cell, cursor) {
-                    let line = line.get_or_insert_with(|| self.line(probe, end));
-                    probe.meet(masks, cell, cursor, line);
-                }
-            }),
+            None => step_all(families, &origin, rays, &mut Marker { masks }),
+            Some(probe) => {
+                let mut prober = Prober {
+                    bundle: self,
+                    masks,
+                    probe,
+                };
+                step_all(families, &origin, rays, &mut prober)
+            }
         }
     }
 
     /// Line to the mean of the voxel that a ray ends in, or to its lattice point where there is none.
-    #[inline(never)]
     fn line(&self, probe: &Probe<'_>, end: Packed) -> Line {
         let center = || self.traversal.lattice.center(end.unpack());
         let to_end = probe.mean_m(end).unwrap_or_else(center) - self.origin_m;
@@ -330,34 +328,86 @@ impl Rays<'_> {
     }
 }
 
-/// Steps along all rays, each given with its end; `visit` gets that end, a place for what is kept of a ray, a cell, and a
-/// cursor of the ray. Returns the number of visits.
+/// Handler of the cells that rays leave. A trait, since closures cannot be told to be compiled into their caller.
+trait Visit {
+    fn visit(&mut self, cell: Packed, place: &mut Place);
+}
+
+/// State of a ray besides its steps.
+struct Place {
+    cursor: Cursor,
+    end: Packed,
+    line: Option<Line>,
+}
+
+/// Marks cells as traversed.
+struct Marker<'a> {
+    masks: &'a mut ScanMasks,
+}
+
+impl Visit for Marker<'_> {
+    #[inline(always)]
+    fn visit(&mut self, cell: Packed, place: &mut Place) {
+        self.masks.pass(cell, &mut place.cursor);
+    }
+}
+
+/// Marks cells as traversed, and shows a probe its voxels among them.
+struct Prober<'a, 'p> {
+    bundle: &'a Rays<'a>,
+    masks: &'a mut ScanMasks,
+    probe: &'a mut Probe<'p>,
+}
+
+impl Visit for Prober<'_, '_> {
+    #[inline(always)]
+    fn visit(&mut self, cell: Packed, place: &mut Place) {
+        if !place.cursor.is_in_block_of(cell) {
+            self.probe.enter(self.masks, cell, &mut place.cursor);
+        }
+        self.masks.pass(cell, &mut place.cursor);
+        if self.probe.is_open(cell, &place.cursor) {
+            self.meet(cell, place);
+        }
+    }
+}
+
+impl Prober<'_, '_> {
+    #[inline(never)]
+    fn meet(&mut self, cell: Packed, place: &mut Place) {
+        let line = || self.bundle.line(self.probe, place.end);
+        let line = place.line.get_or_insert_with(line);
+        self.probe.meet(self.masks, cell, &place.cursor, line);
+    }
+}
+
+/// Steps along all rays, each given with its end; returns the number of visits.
 #[inline(always)]
 fn step_all<const P: usize>(
     families: &Families<P>,
     origin: &Origin<P>,
-    mut rays: impl Iterator<Item = (Ray<P>, Packed)>,
-    mut visit: impl FnMut(Packed, &mut Option<Line>, Packed, &mut Cursor),
+    rays: impl Iterator<Item = (Ray<P>, Packed)>,
+    visitor: &mut impl Visit,
 ) -> u64 {
     let mut visits = 0;
-    let mut lanes: Vec<Lane<P>> = rays
-        .by_ref()
-        .take(LANES)
-        .map(|(ray, end)| Lane {
-            ray,
-            cursor: Cursor::NONE,
-            end,
-            line: None,
-        })
-        .collect();
-    while let Ok(full) = <&mut [Lane<P>; LANES]>::try_from(lanes.as_mut_slice()) {
+    let mut rays = rays.map(|(ray, end)| {
+        let (cursor, line) = (Cursor::NONE, None);
+        (ray, Place { cursor, end, line })
+    });
+    let mut lanes: Vec<(Ray<P>, Place)> = rays.by_ref().take(LANES).collect();
+    while let Ok(full) = <&mut [(Ray<P>, Place); LANES]>::try_from(lanes.as_mut_slice()) {
         let mut ended = None;
-        for (i, lane) in full.iter_mut().enumerate() {
-            if !lane.step(families, origin, &mut visit) {
-                visits += std::mem::take(&mut lane.ray.steps);
-                match rays.next() {
-                    Some((ray, end)) => (lane.ray, lane.end, lane.line) = (ray, end, None),
-                    None => ended = Some(i),
+        for (i, (ray, place)) in full.iter_mut().enumerate() {
+            if let Some(cell) = families.step(origin, ray) {
+                visitor.visit(cell, place);
+                continue;
+            }
+            visits += ray.steps;
+            match rays.next() {
+                Some(next) => (*ray, place.end, place.line) = (next.0, next.1.end, None),
+                None => {
+                    ray.steps = 0;
+                    ended = Some(i);
                 }
             }
         }
@@ -365,30 +415,11 @@ fn step_all<const P: usize>(
             lanes.swap_remove(i);
         }
     }
-    for lane in &mut lanes {
-        while lane.step(families, origin, &mut visit) {}
-        visits += lane.ray.steps;
+    for (ray, place) in &mut lanes {
+        while let Some(cell) = families.step(origin, ray) {
+            visitor.visit(cell, place);
+        }
+        visits += ray.steps;
     }
     visits
-}
-
-/// Ray among those that are followed in turn.
-struct Lane<const P: usize> {
-    ray: Ray<P>,
-    cursor: Cursor,
-    end: Packed,
-    line: Option<Line>,
-}
-
-impl<const P: usize> Lane<P> {
-    #[inline(always)]
-    fn step(
-        &mut self,
-        families: &Families<P>,
-        origin: &Origin<P>,
-        visit: &mut impl FnMut(Packed, &mut Option<Line>, Packed, &mut Cursor),
-    ) -> bool {
-        let (end, line, cursor) = (self.end, &mut self.line, &mut self.cursor);
-        families.step(origin, &mut self.ray, |cell| visit(end, line, cell, cursor))
-    }
 }

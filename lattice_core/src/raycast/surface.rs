@@ -104,27 +104,26 @@ impl<'a> Probe<'a> {
         self.surfaces.passed.clear();
     }
 
-    /// True for a voxel that is not hit and may yet be passed through. All hits of the scan are marked.
-    #[inline(always)]
-    pub(super) fn is_open(&mut self, masks: &ScanMasks, cell: Packed, cursor: &Cursor) -> bool {
-        if self.surfaces.open.len() <= cursor.slot {
-            self.open_blocks(masks);
-        }
-        let open = self.surfaces.open.get(cursor.slot);
-        open.is_some_and(|mask| mask.has(cell.place()))
-    }
-
+    /// Moves a cursor to the block of a cell, whose voxels are read from the store once a scan. All hits of the scan are
+    /// marked.
     #[inline(never)]
-    fn open_blocks(&mut self, masks: &ScanMasks) {
+    pub(super) fn enter(&mut self, masks: &mut ScanMasks, cell: Packed, cursor: &mut Cursor) {
+        *cursor = masks.enter(cell.block());
         let open = &mut self.surfaces.open;
-        let first = open.len();
-        open.extend((first..).zip(masks.blocks_from(first)).map(
-            |(slot, (block, hit))| match slot {
+        for (slot, (block, hit)) in (open.len()..).zip(masks.blocks_from(open.len())) {
+            open.push(match slot {
                 // The cells of refused blocks.
                 0 => Mask::default(),
                 _ => Mask::of_voxels(self.store, block).without(hit),
-            },
-        ));
+            });
+        }
+    }
+
+    /// True for a voxel of an entered block that is not hit and may yet be passed through.
+    #[inline(always)]
+    pub(super) fn is_open(&self, cell: Packed, cursor: &Cursor) -> bool {
+        let open = self.surfaces.open.get(cursor.slot);
+        open.is_some_and(|mask| mask.has(cell.place()))
     }
 
     /// Mean of a voxel, metres from lattice point 0; `None` if the cell is not occupied.
@@ -133,7 +132,6 @@ impl<'a> Probe<'a> {
     }
 
     /// Tests a ray that traverses an open voxel, which it closes if it is passed through or will never be.
-    #[inline(never)]
     pub(super) fn meet(&mut self, masks: &ScanMasks, cell: Packed, cursor: &Cursor, line: &Line) {
         let is_full = self.surfaces.is_full();
         let Surfaces {
