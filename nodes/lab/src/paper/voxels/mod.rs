@@ -9,6 +9,7 @@ mod matching;
 mod neighbors;
 mod quantization;
 mod radial;
+mod report_options;
 mod rotations;
 mod sample;
 mod scan;
@@ -16,27 +17,10 @@ mod theory;
 
 use crate::report::{Report, Section};
 use crate::{AnyError, at};
-use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
+pub use report_options::Options;
 use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// Options of the report.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// The same seed gives the same bytes.
-    pub seed: u64,
-    /// Fewer samples and trials.
-    pub quick: bool,
-    /// Point files of single scans, for Fig. 5.
-    pub scans: Vec<PathBuf>,
-    /// Logs, for Table I.
-    pub bags: Vec<PathBuf>,
-    /// Folder of pairs of scans, for Fig. 6.
-    pub pairs: Option<PathBuf>,
-    /// Further pairs: file of the map's scan, of the scan that is matched, and of its pose in the map.
-    pub pair_files: Vec<[PathBuf; 3]>,
-}
 
 type Make = fn(&Options, &mut dyn FnMut(f64)) -> Result<Section, AnyError>;
 
@@ -95,20 +79,6 @@ fn command(options: &Options) -> String {
 
 fn file_name(path: &Path) -> Cow<'_, str> {
     path.file_name().unwrap_or_default().to_string_lossy()
-}
-
-/// The lattice with cells of 1 m^3.
-fn unit(kind: LatticeKind) -> Result<Lattice, AnyError> {
-    Ok(Lattice::new(kind, 1.0)?)
-}
-
-/// One of each pair of opposite differences, written "±(1,0,0)".
-fn pairs(differences: impl IntoIterator<Item = LatticeIndex>) -> String {
-    let half = differences.into_iter().filter(|w| *w > [0; 3]);
-    let mut half: Vec<LatticeIndex> = half.collect();
-    half.sort_unstable();
-    let words = half.iter().map(|[a, b, c]| format!("±({a},{b},{c})"));
-    words.collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
