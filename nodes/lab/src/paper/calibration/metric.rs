@@ -1,6 +1,6 @@
 //! Eq. (9): how far a calibration is off, and what that depends on.
 
-use super::Context;
+use super::context::Context;
 use crate::AnyError;
 use crate::evaluate::{PRINTED, quantile};
 use crate::metrics::PoseError;

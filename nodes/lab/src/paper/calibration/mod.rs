@@ -1,6 +1,7 @@
 //! Nakamura et al. 2019, "Calibration System Using Semantic-ICP for Visualization of Robot Spatial Perception Through
 //! Mixed Reality", computed anew.
 
+mod context;
 mod equations;
 mod label_maps;
 mod metric;
@@ -10,6 +11,7 @@ use crate::evaluate::{Results, Settings, Testbed, Trial, read_house};
 use crate::report::{Report, Section};
 use crate::simulate::house::House;
 use crate::{AnyError, at};
+use context::Context;
 use std::path::PathBuf;
 
 /// Options of the report.
@@ -31,18 +33,6 @@ pub struct Options {
 const SEEDS_EACH: u64 = 1000;
 /// Views of the robot's survey in a quick run.
 const QUICK_VIEWS: usize = 192;
-
-/// Testbed and options that the sections share.
-struct Context {
-    testbed: Testbed,
-    seed: u64,
-    /// Seed of the first trial.
-    first_seed: u64,
-    quick: bool,
-    threads: usize,
-    /// Side of a cell of the robot's map, metres.
-    cell_side_m: f64,
-}
 
 /// Computes all sections; `progress` gets the share done and the name of the next section.
 pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, AnyError> {

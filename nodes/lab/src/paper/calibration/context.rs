@@ -1,0 +1,15 @@
+//! Testbed and extent of a report, for all of its sections.
+
+use crate::evaluate::Testbed;
+
+/// Testbed and options that the sections share.
+pub(super) struct Context {
+    pub(super) testbed: Testbed,
+    pub(super) seed: u64,
+    /// Seed of the first trial.
+    pub(super) first_seed: u64,
+    pub(super) quick: bool,
+    pub(super) threads: usize,
+    /// Side of a cell of the robot's map, metres.
+    pub(super) cell_side_m: f64,
+}
