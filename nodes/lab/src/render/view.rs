@@ -1,6 +1,5 @@
 //! Parallel projection.
 
-use super::raster::Scene;
 use crate::evaluate::extent;
 use nalgebra::Vector3;
 
@@ -41,9 +40,13 @@ impl View {
         }
     }
 
-    /// Moves and scales so that the whole scene is seen.
-    pub(super) fn fit(mut self, scene: &Scene) -> View {
-        let centers: Vec<[f64; 3]> = scene.centers().map(|c| self.along(&c)).collect();
+    /// Moves and scales so that all cells are seen: their centres, and their largest extent from these.
+    pub(super) fn fit(
+        mut self,
+        centers: impl Iterator<Item = Vector3<f64>>,
+        radius_m: f64,
+    ) -> View {
+        let centers: Vec<[f64; 3]> = centers.map(|c| self.along(&c)).collect();
         if centers.is_empty() {
             return self;
         }
@@ -52,7 +55,7 @@ impl View {
         for (axis, side) in sides.into_iter().enumerate() {
             let [low, high] = extent(centers.iter().map(|c| c[axis]));
             self.middle_m[axis] = 0.5 * (low + high);
-            let extent = high - low + 2.0 * scene.radius_m;
+            let extent = high - low + 2.0 * radius_m;
             let scale = side as f64 * (1.0 - 2.0 * MARGIN) / extent;
             self.scale = self.scale.min(scale);
         }
