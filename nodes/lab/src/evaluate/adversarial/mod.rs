@@ -13,7 +13,7 @@ use super::settings::Cell;
 use super::trial::{OURS, Trial};
 use crate::AnyError;
 use crate::random::Stream;
-use scenes::{Fault, Look, Object, Scene, small_room};
+use scenes::{ALIKE, BROKEN, Fault, Look, NEARLY, Object, Scene, WRONG_INPUT, small_room};
 
 /// Adversarial scene.
 #[derive(Clone, Copy, Debug)]
@@ -25,12 +25,6 @@ enum Kind {
     SmallRoom(Object),
     Fault(Fault),
 }
-
-/// Kinds of adversarial scenes, the first part of a scene's name.
-const ALIKE: &str = "alike";
-const BROKEN: &str = "broken";
-const NEARLY: &str = "nearly alike";
-const WRONG_INPUT: &str = "wrong input";
 
 impl AdversarialScene {
     /// Cell size of the maps, metres.

@@ -1,7 +1,6 @@
 //! Report of the adversarial scenes.
 
-use super::scenes::Fault;
-use super::{ALIKE, BROKEN, NEARLY, WRONG_INPUT};
+use super::scenes::{ALIKE, BROKEN, Fault, NEARLY, WRONG_INPUT};
 use crate::evaluate::trial::{Trial, WRONG};
 use crate::report::{Cell, Report, Section, Table};
 

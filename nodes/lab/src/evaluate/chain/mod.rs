@@ -4,6 +4,7 @@
 //! truth.
 
 mod devices;
+mod methods;
 mod report;
 
 pub use report::chain_report;
@@ -35,6 +36,7 @@ use devices::{
     Both, headset_mesh, headset_scan, house_from_headset, middle_m, right_share, robot_map,
     together, unlabelled,
 };
+use methods::{COMPETITOR, STARTS, TRUE_LABELS, UNLABELLED};
 
 /// Purposes of seeds.
 const VIEW: u64 = 11;
@@ -43,16 +45,6 @@ const LOOK: u64 = 13;
 const IMAGE: u64 = 14;
 const START: u64 = 15;
 
-/// Ours without any labels, and with true ones.
-pub const UNLABELLED: &str = "ours_unlabelled";
-/// Ours with true labels.
-pub const TRUE_LABELS: &str = "ours_true_labels";
-/// The competitor, with the starts that it gets.
-pub const COMPETITOR: &str = "gicp_se3";
-const STARTS: [Start; 2] = [
-    Start::Off { m: 0.3, deg: 10.0 },
-    Start::Off { m: 0.8, deg: 35.0 },
-];
 /// Distance within which a point of the headset is compared with one of the map, metres.
 const SHARED_M: f64 = 0.15;
 

@@ -2,7 +2,7 @@
 
 use super::super::statistics::{Share, median};
 use super::super::trial::{OURS, Trial, WRONG};
-use super::{COMPETITOR, STARTS, TRUE_LABELS, UNLABELLED};
+use super::methods::{COMPETITOR, STARTS, TRUE_LABELS, UNLABELLED};
 use crate::evaluate::settings::Start;
 use crate::report::{Cell, Report, Section, Table};
 

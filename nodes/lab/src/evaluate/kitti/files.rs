@@ -1,6 +1,6 @@
 //! Scans for other programs.
 
-use super::Prepared;
+use super::measure::Prepared;
 use crate::evaluate::files::write_cloud;
 use crate::{AnyError, at};
 use lattice_core::registration::SemanticCloud;

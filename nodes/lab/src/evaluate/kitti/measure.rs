@@ -1,9 +1,10 @@
 //! Pairs of scans and the results of each method on them.
 
-use super::{KittiMethod, RIGHT, Scan};
+use super::methods::KittiMethod;
+use super::scans::Scan;
 use crate::AnyError;
 use crate::bench::timed;
-use crate::evaluate::trial::rounded;
+use crate::evaluate::trial::{Bounds, rounded};
 use crate::metrics::PoseError;
 use lattice_core::registration::{
     CalibrationMap, CalibrationRequest, PrepareOptions, PreparedCloud, Profile, SemanticCloud,
@@ -11,6 +12,9 @@ use lattice_core::registration::{
 };
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde::Serialize;
+
+/// Error bounds of a correct pose: 0.15 m and 0.3 degrees.
+pub const RIGHT: Bounds = Bounds { m: 0.15, deg: 0.3 };
 
 /// Two scans, of which the first is moved.
 #[derive(Clone, PartialEq, Debug, Serialize)]

@@ -1,6 +1,6 @@
 //! The report of a comparison on laser scans.
 
-use super::{KittiReport, PairRow};
+use super::measure::{KittiReport, PairRow};
 use crate::evaluate::median;
 use crate::report::{Cell, Report, Section, Table};
 
