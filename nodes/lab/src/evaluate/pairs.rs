@@ -26,25 +26,44 @@ pub fn trial(
     seen_m: &[Point3<f64>],
     overlap: f64,
 ) -> Trial {
-    // Times are taken beside other trials: they would say nothing.
-    let trial = Trial::of_pose(cell, OURS, &found.target_from_source, truth, seen_m, 0.0);
     Trial {
         overlap: Some(rounded(overlap)),
-        ..trial.with_judgement(found, truth)
+        ..Trial::of_calibration(cell, OURS, found, truth, seen_m)
     }
 }
 
-/// Trials by the name of their scene, in the order of the trials.
-pub fn of_scenes(trials: &[Trial]) -> Vec<(String, Vec<&Trial>)> {
-    let mut scenes: Vec<(String, Vec<&Trial>)> = Vec::new();
+/// Trials by a name, in the order of the trials.
+pub fn by_name<'a>(
+    trials: impl Iterator<Item = &'a Trial>,
+    name: impl Fn(&'a Trial) -> &'a str,
+) -> Vec<(&'a str, Vec<&'a Trial>)> {
+    let mut scenes: Vec<(&str, Vec<&Trial>)> = Vec::new();
     for trial in trials {
-        let name = &trial.cell.scene;
-        match scenes.iter_mut().find(|(known, _)| known == name) {
+        let name = name(trial);
+        match scenes.iter_mut().find(|(known, _)| *known == name) {
             Some((_, of)) => of.push(trial),
-            None => scenes.push((name.clone(), vec![trial])),
+            None => scenes.push((name, vec![trial])),
         }
     }
     scenes
+}
+
+/// Trials by the name of their scene, and all of them.
+pub fn of_scenes_and_all(trials: &[Trial]) -> Vec<(&str, Vec<&Trial>)> {
+    let mut scenes = by_name(trials.iter(), |trial| &trial.cell.scene);
+    scenes.push(("all", trials.iter().collect()));
+    scenes
+}
+
+/// Cells of a trial: metres, degrees, log-margin and per cent on the map.
+pub fn errors(trial: &Trial) -> [Entry; 4] {
+    let judged = trial.judged.as_ref();
+    [
+        Entry::Number(trial.translation_m, 3),
+        Entry::Number(trial.rotation_deg, 2),
+        Entry::number(judged.and_then(|j| j.margin), 0),
+        Entry::number(judged.map(|j| 100.0 * j.inliers), 0),
+    ]
 }
 
 /// Titles of a table whose rows are of `what`.

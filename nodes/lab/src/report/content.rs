@@ -27,6 +27,11 @@ impl Report {
         }
     }
 
+    /// A report of `lattice evaluate` with these words.
+    pub fn of_evaluation(title: &str, lead: String, words: &str, sections: Vec<Section>) -> Report {
+        Report::new(title, lead, format!("lattice evaluate {words}"), sections)
+    }
+
     /// A report of a paper, whose title has its authors.
     pub fn of_paper(title: &str, command: String, quick: bool, sections: Vec<Section>) -> Report {
         let mut lead = "Each table and figure computed anew.".to_owned();
@@ -80,6 +85,22 @@ impl Section {
             tables: Vec::new(),
             figures: Vec::new(),
         }
+    }
+
+    /// A section of an evaluation with one table, of its name and title.
+    pub fn of_table(
+        id: &str,
+        title: &str,
+        columns: &str,
+        rows: impl IntoIterator<Item = Vec<Cell>>,
+    ) -> Section {
+        Section::measured(id, title, "").with_table(Table::new(id, title, columns, rows))
+    }
+
+    /// The section with one more table.
+    pub fn with_table(mut self, table: Table) -> Section {
+        self.tables.push(table);
+        self
     }
 
     pub fn failing(&self) -> impl Iterator<Item = &Check> {

@@ -6,8 +6,9 @@ mod scenes;
 
 pub use report::adversarial_report;
 
-use lattice_core::registration::{CalibrationMap, CalibrationRequest, register_global};
+use lattice_core::registration::CalibrationMap;
 
+use super::global_registration::register;
 use super::many::Case;
 use super::settings::Cell;
 use super::trial::{OURS, Trial};
@@ -75,15 +76,8 @@ impl Case for AdversarialScene {
         };
         let map = CalibrationMap::new(map, Self::CELL_SIDE_M)?;
         let seen_m = scan.cloud.points_m.clone();
-        let request = CalibrationRequest {
-            source_clouds: &[scan],
-            start: None,
-            confusion: None,
-        };
-        let found = register_global(&map, &request, &options, &());
-        // Times are taken beside other trials: they would say nothing.
-        let trial = Trial::of_pose(cell, OURS, &found.target_from_source, &truth, &seen_m, 0.0);
-        Ok(trial.with_judgement(&found, &truth))
+        let found = register(&map, &[scan], None, &options);
+        Ok(Trial::of_calibration(cell, OURS, &found, &truth, &seen_m))
     }
 }
 
