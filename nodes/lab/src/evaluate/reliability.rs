@@ -36,13 +36,8 @@ pub fn reliability_report(sets: &[Set]) -> Result<Report, AnyError> {
          those that this version states of the margins that were recorded."
     );
     let sections = vec![stated(sets)?, errors(sets)];
-    let command = "lattice evaluate reliability".to_owned();
-    Ok(Report::new(
-        "Verdicts, stated and observed",
-        lead,
-        command,
-        sections,
-    ))
+    let title = "Verdicts, stated and observed";
+    Ok(Report::of_evaluation(title, lead, "reliability", sections))
 }
 
 /// Poses with what was said of them; clouds that belong nowhere are left out.
@@ -106,11 +101,10 @@ fn stated(sets: &[Set]) -> Result<Section, AnyError> {
     let names: String = sets.iter().map(|(name, _)| format!("|{name}")).collect();
     let columns = format!("stated probability|its mean|at another place{names}");
     let title = "Probability that a pose is at another place";
-    let rows: Vec<Vec<Cell>> = DECADES.iter().map(line).collect();
     Ok(Section {
-        tables: vec![Table::new("stated", title, &columns, rows), odds(sets)],
         figures: vec![diagram(sets)?],
-        ..Section::measured("stated", title, "")
+        ..Section::of_table("stated", title, &columns, DECADES.iter().map(line))
+            .with_table(odds(sets))
     })
 }
 
@@ -192,11 +186,8 @@ fn errors(sets: &[Set]) -> Section {
     };
     let columns = "set|accepted|median NEES|mean NEES|largest";
     let title = "Normalised squared error of the accepted, 6 degrees of freedom: 6 is right on average, 5.3 in the median";
-    let rows: Vec<Vec<Cell>> = sets.iter().map(line).collect();
-    Section {
-        tables: vec![Table::new("nees", title, columns, rows)],
-        ..Section::measured("nees", "Errors against the stated covariance", "")
-    }
+    let table = Table::new("nees", title, columns, sets.iter().map(line));
+    Section::measured("nees", "Errors against the stated covariance", "").with_table(table)
 }
 
 #[cfg(test)]

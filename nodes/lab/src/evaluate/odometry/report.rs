@@ -26,17 +26,10 @@ pub(super) fn report_of(lead: &str, trials: &[OdometryTrial]) -> Report {
          their submaps; RPE over {SEGMENT_M} m; a pose that is OK and off by more than {WRONG_M} m is wrong, \
          and so is a loop. The ATE with loops is that of all submaps that loops join."
     );
-    let section = Section {
-        tables: vec![Table::new(
-            "odometry",
-            "All scenes",
-            columns,
-            rows.collect::<Vec<Vec<Cell>>>(),
-        )],
-        ..Section::measured("odometry", "Lidar odometry against the truth", "")
-    };
-    let command = "lattice evaluate odometry".to_owned();
-    Report::new("Lidar odometry", lead, command, vec![section])
+    let title = "Lidar odometry against the truth";
+    let table = Table::new("odometry", "All scenes", columns, rows);
+    let section = Section::measured("odometry", title, "").with_table(table);
+    Report::of_evaluation("Lidar odometry", lead, "odometry", vec![section])
 }
 
 fn line(scene: &str, trials: &[&OdometryTrial]) -> Vec<Cell> {
