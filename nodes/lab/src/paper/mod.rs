@@ -2,6 +2,7 @@
 //! printed: Ryde & Brünig 2011 (lattices) and Nakamura et al. (calibration).
 
 pub mod calibration;
+mod command;
 mod estimate;
 mod parallel;
 mod streams;

@@ -8,11 +8,13 @@ mod metric;
 mod trials;
 
 use crate::evaluate::{Results, Settings, Testbed, Trial, read_house};
+use crate::paper::command;
 use crate::report::{Report, Section};
 use crate::simulate::house::House;
 use crate::{AnyError, at};
 use context::Context;
 use std::path::PathBuf;
+use std::slice;
 
 /// Options of the report.
 #[derive(Clone, Debug)]
@@ -102,24 +104,13 @@ fn evaluated(
     Ok((settings, Some(trials)))
 }
 
-/// The command line, with the names of files but not where they lie.
+/// The command line, with the names of files.
 fn command(options: &Options) -> String {
-    let mut words = format!("lattice paper calibration --seed {}", options.seed);
-    if options.quick {
-        words.push_str(" --quick");
-    }
-    let mut named = |option: &str, path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        words.push_str(&format!(" --{option} {name}"));
-    };
-    if let Some((mesh, classes)) = &options.mesh {
-        named("mesh", mesh);
-        named("classes", classes);
-    }
-    if let Some(results) = &options.results {
-        named("results", results);
-    }
-    words
+    let mesh = options.mesh.iter();
+    let mesh = mesh.flat_map(|(mesh, classes)| [("mesh", mesh), ("classes", classes)]);
+    let files = mesh.chain(options.results.iter().map(|folder| ("results", folder)));
+    let files = files.map(|(option, path)| (option, slice::from_ref(path)));
+    command::command("calibration", (options.seed, options.quick), files)
 }
 
 #[cfg(test)]

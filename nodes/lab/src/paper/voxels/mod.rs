@@ -15,12 +15,11 @@ mod sample;
 mod scan;
 mod theory;
 
+use crate::paper::command::command;
 use crate::report::{Report, Section};
 use crate::{AnyError, at};
 pub use report_options::Options;
-use std::borrow::Cow;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::{fs, slice};
 
 type Make = fn(&Options, &mut dyn FnMut(f64)) -> Result<Section, AnyError>;
 
@@ -56,29 +55,14 @@ pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Rep
         before += share;
     }
     let title = "Ryde and Brünig 2011, Lattice Occupied Voxel Lists for Representation of Spatial Occupancy";
-    let command = command(options);
+    let one = |option: &'static str| move |path| (option, slice::from_ref(path));
+    let files = options.scans.iter().map(one("scan"));
+    let files = files.chain(options.bags.iter().map(one("bag")));
+    let files = files.chain(options.pairs.iter().map(one("pairs")));
+    let pairs = options.pair_files.iter();
+    let files = files.chain(pairs.map(|files| ("pair", files.as_slice())));
+    let command = command("voxels", (options.seed, options.quick), files);
     Ok(Report::of_paper(title, command, options.quick, sections))
-}
-
-/// The command line, with the names of files but not where they lie.
-fn command(options: &Options) -> String {
-    let mut words = format!("lattice paper voxels --seed {}", options.seed);
-    if options.quick {
-        words.push_str(" --quick");
-    }
-    let named = |option: &str, path: &PathBuf| format!(" --{option} {}", file_name(path));
-    words.extend(options.scans.iter().map(|path| named("scan", path)));
-    words.extend(options.bags.iter().map(|path| named("bag", path)));
-    words.extend(options.pairs.iter().map(|path| named("pairs", path)));
-    for [map, scan, pose] in &options.pair_files {
-        words.push_str(&named("pair", map));
-        words.extend([scan, pose].map(|path| format!(" {}", file_name(path))));
-    }
-    words
-}
-
-fn file_name(path: &Path) -> Cow<'_, str> {
-    path.file_name().unwrap_or_default().to_string_lossy()
 }
 
 #[cfg(test)]

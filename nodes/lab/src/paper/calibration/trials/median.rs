@@ -5,15 +5,15 @@ use crate::report::{Cell, numbers};
 
 /// A median with its 95 % interval.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Median {
-    pub(super) n: usize,
-    pub(super) value: f64,
+pub struct Median {
+    pub n: usize,
+    pub value: f64,
     /// None of too few values.
-    pub(super) interval: Option<[f64; 2]>,
+    pub interval: Option<[f64; 2]>,
 }
 
 impl Median {
-    pub(super) fn of(values: impl Iterator<Item = f64>) -> Option<Median> {
+    pub fn of(values: impl Iterator<Item = f64>) -> Option<Median> {
         let values: Vec<f64> = values.collect();
         let interval = median_interval(values.iter().copied());
         Some(Median {
@@ -24,13 +24,13 @@ impl Median {
     }
 
     /// Ends of the interval as cells.
-    pub(super) fn ends(&self, digits: usize) -> [Cell; 2] {
+    pub fn ends(&self, digits: usize) -> [Cell; 2] {
         let ends = self.interval.map(|ends| numbers(digits, ends));
         ends.unwrap_or([Cell::Empty, Cell::Empty])
     }
 
     /// "0.06 [0.05, 0.08]".
-    pub(super) fn text(&self) -> String {
+    pub fn text(&self) -> String {
         match self.interval {
             Some(ends) => {
                 let [low, high] = ends.map(short);

@@ -24,20 +24,17 @@ const SEEDS: u64 = 15;
 const QUICK_SEEDS: u64 = 1;
 
 /// Trials of all methods from two starts.
-pub(super) struct Trials {
-    pub(super) all: Vec<Trial>,
+pub struct Trials {
+    pub all: Vec<Trial>,
     /// A good start and a bad one, as they are written.
-    pub(super) starts: [String; 2],
+    pub starts: [String; 2],
     /// The share of wrong labels that is taken for bad.
-    pub(super) bad: f64,
+    pub bad: f64,
 }
 
 impl Trials {
     /// Runs the trials; `progress` gets the share done.
-    pub(super) fn run(
-        context: &Context,
-        progress: &mut dyn FnMut(f64),
-    ) -> Result<Trials, AnyError> {
+    pub fn run(context: &Context, progress: &mut dyn FnMut(f64)) -> Result<Trials, AnyError> {
         let [fast @ .., _ours] = &methods();
         let names = |methods: &[&str]| methods.iter().map(|name| (*name).to_owned()).collect();
         let plan = Plan {
@@ -75,7 +72,7 @@ impl Trials {
 
     /// Trials of an evaluation: the nearest start and the farthest, and the share of wrong labels nearest to
     /// [`BAD`].
-    pub(super) fn of(all: Vec<Trial>) -> Result<Trials, AnyError> {
+    pub fn of(all: Vec<Trial>) -> Result<Trials, AnyError> {
         let off = |trial: &Trial| match trial.cell.start.parse() {
             Ok(Start::Off { m, .. }) => Some((m, trial.cell.start.clone())),
             _ => None,
@@ -97,7 +94,7 @@ impl Trials {
     }
 
     /// Trials of one method; of all scenes if `None`.
-    pub(super) fn of_method(
+    pub fn of_method(
         &self,
         scene: Option<Scene>,
         q: f64,
@@ -114,25 +111,13 @@ impl Trials {
     }
 
     /// The median d_SE(3) of a method, if there are trials.
-    pub(super) fn d_se3(
-        &self,
-        scene: Option<Scene>,
-        q: f64,
-        start: &str,
-        method: &str,
-    ) -> Option<Median> {
+    pub fn d_se3(&self, scene: Option<Scene>, q: f64, start: &str, method: &str) -> Option<Median> {
         let trials = self.of_method(scene, q, start, method);
         Median::of(trials.map(|trial| trial.d_se3))
     }
 
     /// The d_SE(3) of a method as a multiple of that of GICP-SE(3) in the same trial.
-    pub(super) fn ratio(
-        &self,
-        scene: Option<Scene>,
-        q: f64,
-        start: &str,
-        method: &str,
-    ) -> Option<Median> {
+    pub fn ratio(&self, scene: Option<Scene>, q: f64, start: &str, method: &str) -> Option<Median> {
         let theirs = self.of_method(scene, q, start, GICP);
         let theirs: BTreeMap<_, f64> = theirs.map(|t| (t.cell.key(), t.d_se3)).collect();
         let ratios = self.of_method(scene, q, start, method).filter_map(|trial| {
@@ -144,13 +129,13 @@ impl Trials {
     }
 
     /// Shares of wrong labels of which there are trials.
-    pub(super) fn flips(&self) -> Vec<f64> {
+    pub fn flips(&self) -> Vec<f64> {
         distinct(self.all.iter().map(|trial| trial.cell.q))
     }
 }
 
 /// "0.3/10" in words.
-pub(super) fn in_words(start: &str) -> String {
+pub fn in_words(start: &str) -> String {
     match start.split_once('/') {
         Some((m, deg)) => format!("{m} m and {deg} degrees off"),
         None => start.to_owned(),
@@ -158,6 +143,6 @@ pub(super) fn in_words(start: &str) -> String {
 }
 
 /// Share of the trials that are right.
-pub(super) fn right(trials: impl Iterator<Item = impl Borrow<Trial>>) -> Share {
+pub fn right(trials: impl Iterator<Item = impl Borrow<Trial>>) -> Share {
     Share::of(trials.map(|trial| trial.borrow().is_within(WRONG)))
 }
