@@ -246,13 +246,9 @@ fn town(random: &mut Stream) -> Drive {
         car(-350.0 + place(60.0), half_m[1] - 3.2, 9.0),
         car(300.0 + place(60.0), half_m[1], -7.5),
     ];
-    let way = Way::Around { half_m, corner_m };
+    let form = Way::Around { half_m, corner_m };
     let length_m = Route::round_m(half_m, corner_m);
-    let route = Route {
-        form: way,
-        speed_m_per_s: 8.0,
-        length_m,
-    };
+    let route = Route::new(form, 8.0, length_m);
     Drive {
         moving,
         ..still(ROOF, solids, route)
@@ -315,11 +311,7 @@ fn indoor(random: &mut Stream) -> Drive {
     }
     let length_m = Route::round_m(half_m, corner_m);
     let form = Way::Around { half_m, corner_m };
-    let route = Route {
-        form,
-        speed_m_per_s: 1.3,
-        length_m,
-    };
+    let route = Route::new(form, 1.3, length_m);
     still(ROBOT, solids, route)
 }
 
@@ -354,11 +346,7 @@ fn corridor(random: &mut Stream) -> Drive {
         }
     }
     let form = Way::Straight { from: [0.0, 0.1] };
-    let route = Route {
-        form,
-        speed_m_per_s: 1.2,
-        length_m,
-    };
+    let route = Route::new(form, 1.2, length_m);
     still(ROBOT, solids, route)
 }
 
@@ -382,21 +370,13 @@ fn tunnel(random: &mut Stream) -> Drive {
         }
     }
     let form = Way::Straight { from: [0.0, -1.5] };
-    let route = Route {
-        form,
-        speed_m_per_s: 12.0,
-        length_m: 400.0,
-    };
+    let route = Route::new(form, 12.0, 400.0);
     still(ROOF, solids, route)
 }
 
 fn yard() -> Drive {
     let (half_m, corner_m) = ([20.0, 15.0], 6.0);
     let form = Way::Around { half_m, corner_m };
-    let route = Route {
-        form,
-        speed_m_per_s: 4.0,
-        length_m: 80.0,
-    };
+    let route = Route::new(form, 4.0, 80.0);
     still(ROOF, Vec::new(), route)
 }
