@@ -5,5 +5,6 @@ pub mod calibration;
 mod command;
 mod estimate;
 mod parallel;
+mod sections;
 mod streams;
 pub mod voxels;

@@ -1,10 +1,12 @@
 //! Testbed and extent of a report, for all of its sections.
 
-use crate::evaluate::Testbed;
+use crate::evaluate::{Testbed, Trial};
 
 /// Testbed and options that the sections share.
 pub(super) struct Context {
     pub(super) testbed: Testbed,
+    /// Trials that were run before.
+    pub(super) evaluated: Option<Vec<Trial>>,
     pub(super) seed: u64,
     /// Seed of the first trial.
     pub(super) first_seed: u64,

@@ -16,6 +16,7 @@ mod scan;
 mod theory;
 
 use crate::paper::command::command;
+use crate::paper::sections::{Part, in_order};
 use crate::report::{Report, Section};
 use crate::{AnyError, at};
 pub use report_options::Options;
@@ -23,8 +24,8 @@ use std::{fs, slice};
 
 type Make = fn(&Options, &mut dyn FnMut(f64)) -> Result<Section, AnyError>;
 
-/// Name, share of the time, and what makes it; in the order of the paper.
-const SECTIONS: [(&str, f64, Make); 10] = [
+/// Sections in the order of the paper.
+const SECTIONS: [Part<Make>; 10] = [
     ("cells", 0.1, cells::section),
     ("eq. (1)-(2)", 3.0, quantization::section),
     ("eq. (3)-(7)", 0.1, neighbors::section),
@@ -45,15 +46,8 @@ pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Rep
     for path in files.chain(&options.pairs) {
         fs::metadata(path).map_err(at(path))?;
     }
-    let all: f64 = SECTIONS.iter().map(|(_, share, _)| share).sum();
-    let mut before = 0.0;
-    let mut sections = Vec::new();
-    for (name, share, make) in SECTIONS {
-        progress(before / all, name);
-        let mut tell = |done: f64| progress((before + share * done) / all, name);
-        sections.push(make(options, &mut tell)?);
-        before += share;
-    }
+    let make = |make: Make, tell: &mut dyn FnMut(f64)| Ok(vec![make(options, tell)?]);
+    let sections = in_order(&SECTIONS, progress, make)?;
     let title = "Ryde and Brünig 2011, Lattice Occupied Voxel Lists for Representation of Spatial Occupancy";
     let one = |option: &'static str| move |path| (option, slice::from_ref(path));
     let files = options.scans.iter().map(one("scan"));

@@ -1,7 +1,8 @@
-//! Eqs. (1) to (8): what is printed, what it should be, and whether the library computes that.
+//! Eqs. (1) to (9): what is printed, what it should be, and whether the library computes that.
 
 mod geometry;
 mod literal;
+mod metric;
 mod reference_scene;
 mod semantic;
 mod slips;
@@ -23,5 +24,6 @@ pub(super) fn sections(
     progress(0.3);
     let geometry = geometry::section(&scene)?;
     progress(0.5);
-    Ok(vec![geometry, semantic::section(context, &scene)?])
+    let semantic = semantic::section(context, &scene)?;
+    Ok(vec![geometry, semantic, metric::section(context)?])
 }

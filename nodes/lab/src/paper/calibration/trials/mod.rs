@@ -10,18 +10,16 @@ mod trials_of_methods;
 
 use super::context::Context;
 use crate::AnyError;
-use crate::evaluate::Trial;
 use crate::report::Section;
 use trials_of_methods::Trials;
 
 /// The sections of Table 1 and of what is concluded.
 pub(super) fn sections(
     context: &Context,
-    evaluated: Option<Vec<Trial>>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<Section>, AnyError> {
-    let trials = match evaluated {
-        Some(trials) => Trials::of(trials)?,
+    let trials = match &context.evaluated {
+        Some(trials) => Trials::of(trials.clone())?,
         None => Trials::run(context, progress)?,
     };
     Ok(vec![table1::section(&trials)?, claim::section(&trials)?])

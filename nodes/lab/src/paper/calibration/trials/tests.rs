@@ -2,7 +2,7 @@
 
 use super::methods::{SEMANTIC, methods};
 use super::*;
-use crate::evaluate::{Cell, OURS};
+use crate::evaluate::{Cell, OURS, Trial};
 use crate::report::Verdict;
 use crate::simulate::house::Scene;
 use nalgebra::Isometry3;
