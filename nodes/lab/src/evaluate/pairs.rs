@@ -4,6 +4,7 @@ use lattice_core::registration::{Calibration, PreparedCloud};
 use nalgebra::{Isometry3, Point3};
 
 use super::settings::Cell;
+use super::statistics::{mean, median};
 use super::trial::{OURS, Trial, WRONG, rounded};
 use crate::report::Cell as Entry;
 
@@ -83,7 +84,6 @@ pub fn line(name: &str, trials: &[&Trial]) -> Vec<Entry> {
     };
     let accepted = trials.iter().filter(|t| t.is_accepted());
     let nees: Vec<f64> = accepted.filter_map(|t| t.judged.as_ref()?.nees).collect();
-    let mean = nees.iter().sum::<f64>() / nees.len().max(1) as f64;
     vec![
         name.into(),
         trials.len().into(),
@@ -91,8 +91,8 @@ pub fn line(name: &str, trials: &[&Trial]) -> Vec<Entry> {
         count(true, false).into(),
         count(false, true).into(),
         count(false, false).into(),
-        Entry::number(super::median(trials.iter().filter_map(|t| t.overlap)), 2),
-        Entry::number(super::median(nees.iter().copied()), 1),
-        Entry::number((!nees.is_empty()).then_some(mean), 1),
+        Entry::number(median(trials.iter().filter_map(|t| t.overlap)), 2),
+        Entry::number(median(nees.iter().copied()), 1),
+        Entry::number(mean(&nees), 1),
     ]
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use plotters::prelude::*;
 
 use super::calibration_regression::CalibrationCurve;
-use super::statistics::{Share, median};
+use super::statistics::{Share, mean, median};
 use super::trial::{Judged, OURS, Trial};
 use crate::AnyError;
 use crate::report::plot::{Layout, chart, svg};
@@ -175,12 +175,11 @@ fn errors(sets: &[Set]) -> Section {
     let line = |(name, trials): &Set| -> Vec<Cell> {
         let accepted = judged(trials).filter(|(trial, _, _)| trial.is_accepted());
         let nees: Vec<f64> = accepted.filter_map(|(_, judged, _)| judged.nees).collect();
-        let mean = nees.iter().sum::<f64>() / nees.len().max(1) as f64;
         vec![
             name.as_str().into(),
             nees.len().into(),
             Cell::number(median(nees.iter().copied()), 1),
-            Cell::number((!nees.is_empty()).then_some(mean), 1),
+            Cell::number(mean(&nees), 1),
             Cell::number(nees.iter().copied().reduce(f64::max), 0),
         ]
     };

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::loops::{LoopTrial, WRONG_M};
 use crate::AnyError;
 use crate::bench::{Spent, timed};
+use crate::evaluate::statistics::mean;
 use crate::simulate::drive::{Drive, DriveScene};
 
 /// Length of the segments over which relative errors are taken, m.
@@ -196,9 +197,6 @@ impl OdometryTrial {
             let deviation_m = spread.symmetric_eigenvalues().max().sqrt();
             self.beyond_3_sigma += u64::from(moved.norm() > 3.0 * deviation_m);
         }
-        let mean = |values: &[f64]| {
-            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-        };
         self.ate_m = (squares / posed.len().max(1) as f64).sqrt();
         self.nees = mean(&nees);
         self.rpe_percent = mean(&segments(posed)).map(|error_m| 100.0 * error_m / SEGMENT_M);
