@@ -5,12 +5,12 @@ use rayon::ThreadPool;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-/// Receiver of what a job finds.
+/// Receiver of the results of a job.
 pub(super) type Found<'a, T> = dyn FnMut(T) -> Result<(), AnyError> + Send + 'a;
 
-/// Runs `work` on each job, `at_once` of them at a time, in their order; what it finds is given to `keep` on this thread.
+/// Runs `work` on each job, `at_once` of them at a time, in their order; `keep` gets each result, on this thread.
 ///
-/// The jobs share the pools: one of one thread for each job at once, or one for all.
+/// Jobs at once take the pools in turn: one pool each, or one for all of them.
 ///
 /// # Errors
 /// That of the first job or result that fails; no more jobs begin then.

@@ -3,7 +3,7 @@
 use crate::AnyError;
 use crate::report::Section;
 
-/// Parts of a report: name, share of the time, and what makes its sections.
+/// Part of a report: name, share of the time, and the maker of its sections.
 pub type Part<M> = (&'static str, f64, M);
 
 /// Makes all parts in their order; `progress` gets the share done and the name of the part.

@@ -6,7 +6,7 @@ use super::trials::Trials;
 use crate::report::plot::title;
 use lattice_core::lattice::LatticeKind;
 
-/// Names of [`SHARES`].
+/// Names of [`SHARES`](super::compare::SHARES).
 pub(super) const SHARE_NAMES: [&str; 2] = ["median", "95th percentile"];
 /// Places in [`LatticeKind::ALL`].
 pub(super) const BCC: usize = 1;
@@ -22,7 +22,7 @@ pub(super) struct Played {
     pub(super) quantiles: Quantiles,
 }
 
-/// Scenes taken together: change against cubic of [`SHARES`] by lattice, and of the poses tried, %.
+/// Scenes taken together: change of errors by share and lattice and of the poses tried, both against cubic, %.
 #[derive(Clone)]
 pub(super) struct Group {
     pub(super) change: [[Estimate; 6]; 2],
