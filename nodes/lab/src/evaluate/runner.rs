@@ -44,3 +44,48 @@ pub(super) fn run_jobs<J: Sync, T: Send>(
         receiver.into_iter().try_for_each(|one| keep(one?))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pool;
+
+    /// Results of 40 jobs, two each, on so many pools; job `fails` does.
+    fn run(at_once: usize, pools: usize, fails: Option<u32>) -> Result<Vec<u32>, AnyError> {
+        let pools: Vec<ThreadPool> = (0..pools).map(|_| pool(2).unwrap()).collect();
+        let jobs: Vec<u32> = (0..40).collect();
+        let work = |job: &u32, found: &mut Found<u32>| {
+            if fails == Some(*job) {
+                return Err(format!("job {job}").into());
+            }
+            found(2 * job)?;
+            found(2 * job + 1)
+        };
+        let mut kept = Vec::new();
+        let mut keep = |one| {
+            kept.push(one);
+            Ok(())
+        };
+        run_jobs(&jobs, at_once, &pools, work, &mut keep)?;
+        Ok(kept)
+    }
+
+    #[test]
+    fn each_job_is_run_once_and_one_at_a_time_in_order() {
+        let all: Vec<u32> = (0..80).collect();
+        assert_eq!(run(1, 1, None).unwrap(), all);
+        for pools in [1, 3] {
+            let mut kept = run(3, pools, None).unwrap();
+            kept.sort_unstable();
+            assert_eq!(kept, all);
+        }
+    }
+
+    #[test]
+    fn a_job_that_fails_ends_the_run() {
+        for (at_once, pools) in [(1, 1), (3, 1), (3, 3)] {
+            let error = run(at_once, pools, Some(7)).unwrap_err();
+            assert_eq!(error.to_string(), "job 7");
+        }
+    }
+}
