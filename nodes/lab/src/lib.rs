@@ -6,6 +6,7 @@ pub mod bench;
 pub mod datasets;
 mod error;
 pub mod evaluate;
+mod labelled_ply;
 mod matching;
 pub use lattice_nodes::mesh;
 pub mod metrics;

@@ -9,7 +9,7 @@ mod search27;
 
 use lattice_core::lattice::{LatticeIndex, LatticeKind};
 use nalgebra::{Matrix3, Vector3};
-pub use search27::Search27;
+pub use search27::{Search27, off_by_one};
 
 /// Generator matrix of eq. (8)-(12) with its four printed digits; `None` for a lattice outside the paper.
 pub fn printed_generator(kind: LatticeKind) -> Option<Matrix3<f64>> {
@@ -59,11 +59,6 @@ pub fn printed_delta(kind: LatticeKind) -> Vec<LatticeIndex> {
     plus.clone()
         .chain(plus.map(|column| column.map(|i| -i)))
         .collect()
-}
-
-/// All 27 index differences with entries -1, 0 and 1; the last entry varies fastest.
-pub fn off_by_one() -> [LatticeIndex; 27] {
-    std::array::from_fn(|i| [i / 9, i / 3 % 3, i % 3].map(|entry| entry as i32 - 1))
 }
 
 /// Quantizer by eq. (1) and (2) for a basis and a set of differences, in double precision.

@@ -334,7 +334,7 @@ const CRATES: [(&str, usize); 7] = [
     ("nodes/src", 0),
     ("nodes/runtime/src", 0),
     ("nodes/bag/src", 0),
-    ("nodes/lab/src", 75),
+    ("nodes/lab/src", 0),
     ("nodes/cli/src", 0),
 ];
 

@@ -1,11 +1,12 @@
 //! `lattice evaluate chain`.
 
+use super::evaluate_many::show;
 use super::processors;
-use super::remaining::Remaining;
+use super::remaining::with_remaining;
 use crate::CliResult;
 use clap::Args;
 use lattice_lab::evaluate::{ChainOptions, Results, chain_report, chain_settings, run_chain};
-use lattice_lab::{markdown, models, write_report};
+use lattice_lab::models;
 use std::path::PathBuf;
 
 /// Options of `lattice evaluate chain`.
@@ -62,15 +63,7 @@ impl Chain {
             threads: self.threads.unwrap_or_else(processors).clamp(1, 1024),
         };
         let mut results = Results::open(&self.out, &chain_settings(&options)?)?;
-        let bar = Remaining::new();
-        let mut tell = |done: usize, total: usize| bar.tell(done, total);
-        let ran = run_chain(&options, &mut results, &mut tell);
-        bar.done();
-        ran?;
-        let report = chain_report(&results.sorted());
-        write_report(&report, &self.out)?;
-        print!("{}", markdown(&report));
-        println!("\nwritten to {}", self.out.display());
-        Ok(())
+        with_remaining(|told| run_chain(&options, &mut results, told))?;
+        show(&chain_report(&results.sorted()), &self.out)
     }
 }

@@ -1,7 +1,7 @@
 //! `lattice evaluate traps`, `town`, `rooms` and `reliability`.
 
 use super::processors;
-use super::remaining::Remaining;
+use super::remaining::with_remaining;
 use crate::CliResult;
 use clap::Args;
 use lattice_lab::evaluate::{
@@ -52,12 +52,8 @@ impl Many {
     pub fn measure<C: Case>(&self, cases: &[C], settings: &Settings) -> Result<Results, AnyError> {
         let threads = self.threads.unwrap_or_else(processors).clamp(1, 1024);
         let mut results = Results::open(&self.out, settings)?;
-        let bar = Remaining::new();
-        let mut tell = |done: usize, total: usize| bar.tell(done, total);
         let seeds = self.first_seed..self.first_seed.saturating_add(self.seeds);
-        let ran = run_cases(cases, seeds, &self.cases, &mut results, threads, &mut tell);
-        bar.done();
-        ran?;
+        with_remaining(|told| run_cases(cases, seeds, &self.cases, &mut results, threads, told))?;
         Ok(results)
     }
 
@@ -110,7 +106,8 @@ impl Reliability {
     }
 }
 
-fn show(report: &Report, out: &Path) -> CliResult {
+/// Writes and prints a report.
+pub fn show(report: &Report, out: &Path) -> CliResult {
     write_report(report, out)?;
     print!("{}", markdown(report));
     println!("\nwritten to {}", out.display());

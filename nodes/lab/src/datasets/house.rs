@@ -1,15 +1,14 @@
 //! The simulated house as files: the robot's map, headset clouds, and the truth.
 
 use crate::evaluate::read_house;
+use crate::labelled_ply::write_cloud;
 use crate::simulate::house::{HeadsetTrial, LabelDraw, Scene, Survey, SurveyOptions};
 use crate::{AnyError, at};
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::pose::Axes;
-use lattice_core::registration::UNLABELED;
 use lattice_core::voxels::file::{MapContents, WriteOptions};
 use lattice_core::voxels::label_names::write_named;
 use lattice_nodes::files::atomic_write;
-use lattice_nodes::files::export::write_labelled_ply;
 use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -229,17 +228,12 @@ fn write_scene(
         };
         let points: Vec<Point3<f64>> = headset_scan.points_m.iter().map(turned).collect();
         let cloud = draw.headset.cloud(&points, &headset_scan.regions);
-        let labels = cloud.labels.iter();
-        let labels = labels.map(|label| label.top().unwrap_or(UNLABELED));
-        let labels: Vec<u16> = labels.collect();
         let path = place(options, &cloud_name)?;
         let comment = match options.axes {
             HeadsetAxes::Ros => "metres, headset_origin: x forward, y left, z up",
             HeadsetAxes::Unity => "metres, headset_origin: x right, y up, z forward (left-handed)",
         };
-        atomic_write::write(&path, |file| {
-            write_labelled_ply(&points, &labels, comment, file)
-        })?;
+        write_cloud(&path, &points, |i| cloud.label(i), comment)?;
         let counts = &mut summary.headset_points;
         counts.insert(cloud_name.clone(), points.len());
         truth.headset_scans.push(HeadsetScanTruth {

@@ -28,6 +28,7 @@
 //! houses, for networks. [`write_drive`] writes the scans of a lidar that moves (see [`crate::simulate::drive`]), for
 //! odometry.
 
+mod bobcat_options;
 mod drive;
 mod facts;
 mod house;
@@ -39,6 +40,7 @@ mod town;
 mod truth;
 mod write;
 
+pub use bobcat_options::BobcatOptions;
 pub use drive::{DriveLogOptions, DriveLogSummary, TRUTH_FILE, write_drive};
 pub use facts::{
     BASE_FRAME, BOBCAT_GPS_WEEK, BOBCAT_GPS_WEEK_MS, BOBCAT_LEAP_SECONDS, BOBCAT_ORIGIN,
@@ -56,4 +58,4 @@ pub use indoor::{
     Indoor, IndoorOptions, IndoorSummary, LabelAccuracy, label_accuracy, write_indoor,
 };
 pub use town::{TownOptions, TownSummary, write_town};
-pub use write::{BobcatOptions, BobcatSummary, write_bobcat};
+pub use write::{BobcatSummary, write_bobcat};

@@ -5,12 +5,11 @@ use std::fmt;
 use std::fs;
 use std::path::PathBuf;
 
-use lattice_core::registration::{SemanticCloud, UNLABELED};
 use lattice_nodes::files::atomic_write;
-use lattice_nodes::files::export::write_labelled_ply;
 use serde::Serialize;
 
-use super::house::CLASSES_FILE;
+use super::house::{CLASSES_FILE, free_place};
+use crate::labelled_ply::write_cloud;
 use crate::simulate::town::{CLASSES, Lidar, Town, drive};
 use crate::{AnyError, at};
 
@@ -53,6 +52,7 @@ impl fmt::Display for TownSummary {
 /// the first: 4 x 4 numbers, row by row.
 pub fn write_town(options: &TownOptions) -> Result<TownSummary, AnyError> {
     fs::create_dir_all(&options.out).map_err(at(&options.out))?;
+    let place = |name: &str| free_place(&options.out, name, options.overwrite);
     let town = Town::new(options.seed);
     let [first, second] = drive(options.seed, options.apart_m);
     let scans = [("map.ply", first, 0), ("cloud.ply", second, 1)];
@@ -60,7 +60,8 @@ pub fn write_town(options: &TownOptions) -> Result<TownSummary, AnyError> {
     for ((name, pose, time), points) in scans.into_iter().zip(&mut points) {
         let scan = town.scan(&pose, &options.lidar, time);
         *points = scan.len();
-        write_scan(options, name, &scan)?;
+        let comment = "metres, sensor: x forward, y left, z up";
+        write_cloud(&place(name)?, &scan.points_m, |i| scan.label(i), comment)?;
     }
     let truth = (first.inverse() * second).to_homogeneous();
     let row = |row: usize| {
@@ -68,27 +69,12 @@ pub fn write_town(options: &TownOptions) -> Result<TownSummary, AnyError> {
         numbers.join(" ") + "\n"
     };
     let text: String = [0, 1, 2, 3].map(row).concat();
-    atomic_write::write_text(&options.place("map_from_cloud.txt")?, &text)?;
+    atomic_write::write_text(&place("map_from_cloud.txt")?, &text)?;
     let classes = BTreeMap::from([("classes", BTreeMap::from(CLASSES))]);
     let text = serde_yaml::to_string(&classes)?;
-    atomic_write::write_text(&options.place(CLASSES_FILE)?, &text)?;
+    atomic_write::write_text(&place(CLASSES_FILE)?, &text)?;
     let out = options.out.clone();
     Ok(TownSummary { out, points })
-}
-
-fn write_scan(options: &TownOptions, name: &str, scan: &SemanticCloud) -> Result<(), AnyError> {
-    let labels = scan.labels.iter();
-    let labels: Vec<u16> = labels.map(|l| l.top().unwrap_or(UNLABELED)).collect();
-    let comment = "metres, sensor: x forward, y left, z up";
-    atomic_write::write(&options.place(name)?, |file| {
-        write_labelled_ply(&scan.points_m, &labels, comment, file)
-    })
-}
-
-impl TownOptions {
-    fn place(&self, name: &str) -> Result<PathBuf, AnyError> {
-        super::house::free_place(&self.out, name, self.overwrite)
-    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The noise-free truth beside a log.
 
-use super::BobcatOptions;
+use super::bobcat_options::BobcatOptions;
 use super::facts::{
     BASE_FRAME, BOBCAT_GPS_WEEK, BOBCAT_GPS_WEEK_MS, BOBCAT_LEAP_SECONDS, BOBCAT_ORIGIN,
     BOBCAT_UNDULATION_M, IMU_FRAME, TURNTABLE_FRAME, bobcat_start_ns,

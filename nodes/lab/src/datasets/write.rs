@@ -1,5 +1,6 @@
 //! The simulated log as a rosbag2 directory.
 
+use super::bobcat_options::BobcatOptions;
 use super::facts::{
     INSPVAX_TOPIC, ODOMETRY_TOPIC, TF_STATIC_TOPIC, TF_TOPIC, points_topic, scan_topic,
 };
@@ -7,7 +8,7 @@ use super::log::{Block, Log};
 use super::truth::{self, Truth};
 use crate::simulate::{Bobcat, Laser};
 use crate::{AnyError, at};
-use lattice_bag::{BagQos, BagWriter, Storage, TopicSpec, WriterOptions, replaceable};
+use lattice_bag::{BagQos, BagWriter, TopicSpec, WriterOptions, replaceable};
 use lattice_msgs::nav_msgs::Odometry;
 use lattice_msgs::novatel_oem7_msgs::INSPVAX;
 use lattice_msgs::sensor_msgs::{LaserScan, PointCloud2};
@@ -20,29 +21,6 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::Builder;
-
-/// Options of a simulated log.
-#[derive(Clone, Debug)]
-pub struct BobcatOptions {
-    /// Seed of all noise; the same seed gives the same messages.
-    pub seed: u64,
-    /// Length of the log, s.
-    pub duration_s: f64,
-    /// Time of the tour at which it begins, s.
-    pub begin_s: f64,
-    /// A person who walks through the yard.
-    pub person: bool,
-    /// True for the scans of the lasers (LaserScan) in place of clouds (PointCloud2).
-    pub scans: bool,
-    /// Constant error of the INS: east, north, up in m, then about up in degrees.
-    pub ins_offset: [f64; 4],
-    /// Storage of the bag.
-    pub storage: Storage,
-    /// Directory of the bag.
-    pub out: PathBuf,
-    /// True to replace an earlier log at `out`.
-    pub overwrite: bool,
-}
 
 /// Summary of a written log.
 #[derive(Clone, Debug, PartialEq, Default, Serialize)]

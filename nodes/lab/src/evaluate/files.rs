@@ -1,28 +1,12 @@
-//! Clouds of an evaluation as files, for other programs.
+//! Headset scans of an evaluation as files, for other programs.
 
 use super::Scenario;
 use super::settings::Cell;
+use crate::labelled_ply::write_cloud;
 use crate::{AnyError, at};
-use lattice_core::registration::{LabelDistribution, UNLABELED};
-use lattice_nodes::files::atomic_write::{self, write_text};
-use lattice_nodes::files::export::write_labelled_ply;
-use nalgebra::Point3;
+use lattice_nodes::files::atomic_write::write_text;
 use std::fs;
 use std::path::Path;
-
-/// Writes points, metres, with their most probable classes.
-pub(super) fn write_cloud(
-    path: &Path,
-    points_m: &[Point3<f64>],
-    label: impl Fn(usize) -> LabelDistribution,
-    comment: &str,
-) -> Result<(), AnyError> {
-    let labels = (0..points_m.len()).map(|i| label(i).top().unwrap_or(UNLABELED));
-    let labels: Vec<u16> = labels.collect();
-    atomic_write::write(path, |file| {
-        write_labelled_ply(points_m, &labels, comment, file)
-    })
-}
 
 /// Writes a headset scan to a folder: `SCENE_SEED_map.ply` and `SCENE_SEED_cloud.ply`, as the map and the headset have them, and
 /// `SCENE_SEED.json` with the true `map_from_headset`, row by row.

@@ -1,11 +1,9 @@
 //! Trials that have nothing in common but how they are run and kept.
 
 use std::ops::Range;
-use std::sync::mpsc;
-
-use rayon::prelude::*;
 
 use super::results::name;
+use super::runner::{Found, run_jobs};
 use super::settings::{Cell, Settings, check_seeds};
 use super::trial::{OURS, Trial};
 use super::{Results, Start};
@@ -65,22 +63,13 @@ pub fn run_cases<C: Case>(
     let trials = seeds.flat_map(|seed| cases.iter().map(move |case| (case.cell(seed), *case)));
     let left = trials.filter(|(cell, _)| !done.contains(&name(cell, OURS)));
     let left: Vec<(Cell, &C)> = left.collect();
-    let pool = pool(threads)?;
-    let (sender, receiver) = mpsc::channel();
-    std::thread::scope(|scope| {
-        let left = &left;
-        scope.spawn(move || {
-            pool.install(|| {
-                // The receiver is gone only after an error: then no more trials begin.
-                let trials = left.par_iter().with_max_len(1);
-                let _ =
-                    trials.try_for_each(|(cell, case)| sender.send(case.run(cell)).map_err(drop));
-            });
-        });
-        for (i, trial) in receiver.into_iter().enumerate() {
-            results.add(trial?)?;
-            progress(i + 1, left.len());
-        }
+    let work = |(cell, case): &(Cell, &C), found: &mut Found<Trial>| found(case.run(cell)?);
+    let mut count = 0;
+    let mut keep = |trial| {
+        results.add(trial)?;
+        count += 1;
+        progress(count, left.len());
         Ok(())
-    })
+    };
+    run_jobs(&left, threads.max(1), &[pool(threads)?], work, &mut keep)
 }

@@ -4,6 +4,7 @@ use lattice_core::registration::{Calibration, PreparedCloud};
 use nalgebra::{Isometry3, Point3};
 
 use super::settings::Cell;
+use super::statistics::{mean, median};
 use super::trial::{OURS, Trial, WRONG, rounded};
 use crate::report::Cell as Entry;
 
@@ -26,25 +27,44 @@ pub fn trial(
     seen_m: &[Point3<f64>],
     overlap: f64,
 ) -> Trial {
-    // Times are taken beside other trials: they would say nothing.
-    let trial = Trial::of_pose(cell, OURS, &found.target_from_source, truth, seen_m, 0.0);
     Trial {
         overlap: Some(rounded(overlap)),
-        ..trial.with_judgement(found, truth)
+        ..Trial::of_calibration(cell, OURS, found, truth, seen_m)
     }
 }
 
-/// Trials by the name of their scene, in the order of the trials.
-pub fn of_scenes(trials: &[Trial]) -> Vec<(String, Vec<&Trial>)> {
-    let mut scenes: Vec<(String, Vec<&Trial>)> = Vec::new();
+/// Trials by a name, in the order of the trials.
+pub fn by_name<'a>(
+    trials: impl Iterator<Item = &'a Trial>,
+    name: impl Fn(&'a Trial) -> &'a str,
+) -> Vec<(&'a str, Vec<&'a Trial>)> {
+    let mut scenes: Vec<(&str, Vec<&Trial>)> = Vec::new();
     for trial in trials {
-        let name = &trial.cell.scene;
-        match scenes.iter_mut().find(|(known, _)| known == name) {
+        let name = name(trial);
+        match scenes.iter_mut().find(|(known, _)| *known == name) {
             Some((_, of)) => of.push(trial),
-            None => scenes.push((name.clone(), vec![trial])),
+            None => scenes.push((name, vec![trial])),
         }
     }
     scenes
+}
+
+/// Trials by the name of their scene, and all of them.
+pub fn of_scenes_and_all(trials: &[Trial]) -> Vec<(&str, Vec<&Trial>)> {
+    let mut scenes = by_name(trials.iter(), |trial| &trial.cell.scene);
+    scenes.push(("all", trials.iter().collect()));
+    scenes
+}
+
+/// Cells of a trial: metres, degrees, log-margin and per cent on the map.
+pub fn errors(trial: &Trial) -> [Entry; 4] {
+    let judged = trial.judged.as_ref();
+    [
+        Entry::Number(trial.translation_m, 3),
+        Entry::Number(trial.rotation_deg, 2),
+        Entry::number(judged.and_then(|j| j.margin), 0),
+        Entry::number(judged.map(|j| 100.0 * j.inliers), 0),
+    ]
 }
 
 /// Titles of a table whose rows are of `what`.
@@ -64,7 +84,6 @@ pub fn line(name: &str, trials: &[&Trial]) -> Vec<Entry> {
     };
     let accepted = trials.iter().filter(|t| t.is_accepted());
     let nees: Vec<f64> = accepted.filter_map(|t| t.judged.as_ref()?.nees).collect();
-    let mean = nees.iter().sum::<f64>() / nees.len().max(1) as f64;
     vec![
         name.into(),
         trials.len().into(),
@@ -72,8 +91,8 @@ pub fn line(name: &str, trials: &[&Trial]) -> Vec<Entry> {
         count(true, false).into(),
         count(false, true).into(),
         count(false, false).into(),
-        Entry::number(super::median(trials.iter().filter_map(|t| t.overlap)), 2),
-        Entry::number(super::median(nees.iter().copied()), 1),
-        Entry::number((!nees.is_empty()).then_some(mean), 1),
+        Entry::number(median(trials.iter().filter_map(|t| t.overlap)), 2),
+        Entry::number(median(nees.iter().copied()), 1),
+        Entry::number(mean(&nees), 1),
     ]
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use plotters::prelude::*;
 
 use super::calibration_regression::CalibrationCurve;
-use super::statistics::{Share, median};
+use super::statistics::{Share, mean, median};
 use super::trial::{Judged, OURS, Trial};
 use crate::AnyError;
 use crate::report::plot::{Layout, chart, svg};
@@ -36,13 +36,8 @@ pub fn reliability_report(sets: &[Set]) -> Result<Report, AnyError> {
          those that this version states of the margins that were recorded."
     );
     let sections = vec![stated(sets)?, errors(sets)];
-    let command = "lattice evaluate reliability".to_owned();
-    Ok(Report::new(
-        "Verdicts, stated and observed",
-        lead,
-        command,
-        sections,
-    ))
+    let title = "Verdicts, stated and observed";
+    Ok(Report::of_evaluation(title, lead, "reliability", sections))
 }
 
 /// Poses with what was said of them; clouds that belong nowhere are left out.
@@ -106,11 +101,10 @@ fn stated(sets: &[Set]) -> Result<Section, AnyError> {
     let names: String = sets.iter().map(|(name, _)| format!("|{name}")).collect();
     let columns = format!("stated probability|its mean|at another place{names}");
     let title = "Probability that a pose is at another place";
-    let rows: Vec<Vec<Cell>> = DECADES.iter().map(line).collect();
     Ok(Section {
-        tables: vec![Table::new("stated", title, &columns, rows), odds(sets)],
         figures: vec![diagram(sets)?],
-        ..Section::measured("stated", title, "")
+        ..Section::of_table("stated", title, &columns, DECADES.iter().map(line))
+            .with_table(odds(sets))
     })
 }
 
@@ -181,22 +175,18 @@ fn errors(sets: &[Set]) -> Section {
     let line = |(name, trials): &Set| -> Vec<Cell> {
         let accepted = judged(trials).filter(|(trial, _, _)| trial.is_accepted());
         let nees: Vec<f64> = accepted.filter_map(|(_, judged, _)| judged.nees).collect();
-        let mean = nees.iter().sum::<f64>() / nees.len().max(1) as f64;
         vec![
             name.as_str().into(),
             nees.len().into(),
             Cell::number(median(nees.iter().copied()), 1),
-            Cell::number((!nees.is_empty()).then_some(mean), 1),
+            Cell::number(mean(&nees), 1),
             Cell::number(nees.iter().copied().reduce(f64::max), 0),
         ]
     };
     let columns = "set|accepted|median NEES|mean NEES|largest";
     let title = "Normalised squared error of the accepted, 6 degrees of freedom: 6 is right on average, 5.3 in the median";
-    let rows: Vec<Vec<Cell>> = sets.iter().map(line).collect();
-    Section {
-        tables: vec![Table::new("nees", title, columns, rows)],
-        ..Section::measured("nees", "Errors against the stated covariance", "")
-    }
+    let table = Table::new("nees", title, columns, sets.iter().map(line));
+    Section::measured("nees", "Errors against the stated covariance", "").with_table(table)
 }
 
 #[cfg(test)]

@@ -39,8 +39,7 @@ pub fn report(summary: &Summary, trials: &[Trial]) -> Result<Report, AnyError> {
         failures(summary),
     ];
     let title = "Calibration, measured in simulation";
-    let command = "lattice evaluate calibration".to_owned();
-    Ok(Report::new(title, lead, command, sections))
+    Ok(Report::of_evaluation(title, lead, "calibration", sections))
 }
 
 fn find<'a>(
@@ -203,19 +202,10 @@ fn consistency(summary: &Summary) -> Section {
         ]
     });
     let columns = "start|poses|mean / 6|median / 5.35";
-    Section {
-        tables: vec![Table::new(
-            "covariance",
-            "Normalised squared errors",
-            columns,
-            rows,
-        )],
-        ..Section::measured(
-            "covariance",
-            "Whether the stated covariance is right",
-            "Normalised squared error of accepted poses, 6 degrees of freedom: 1 is right, less is cautious.",
-        )
-    }
+    let table = Table::new("covariance", "Normalised squared errors", columns, rows);
+    let finding = "Normalised squared error of accepted poses, 6 degrees of freedom: 1 is right, less is cautious.";
+    let title = "Whether the stated covariance is right";
+    Section::measured("covariance", title, finding).with_table(table)
 }
 
 fn times(summary: &Summary) -> Section {
@@ -231,17 +221,12 @@ fn times(summary: &Summary) -> Section {
         ]
     });
     let columns = "method|start|trials|median (ms)|90 % below (ms)";
-    Section {
-        tables: vec![Table::new("times", "Wall times", columns, rows)],
-        ..Section::measured(
-            "times",
-            "Times",
-            format!(
-                "Wall time, the map being ready. Those taken alone had {} threads; all others one, beside other trials.",
-                summary.timed_threads
-            ),
-        )
-    }
+    let finding = format!(
+        "Wall time, the map being ready. Those taken alone had {} threads; all others one, beside other trials.",
+        summary.timed_threads
+    );
+    let table = Table::new("times", "Wall times", columns, rows);
+    Section::measured("times", "Times", finding).with_table(table)
 }
 
 fn failures(summary: &Summary) -> Section {
@@ -267,12 +252,7 @@ fn failures(summary: &Summary) -> Section {
         ])
     });
     let all = summary.failures.len();
-    Section {
-        tables: vec![Table::new("failures", "Failures", columns, rows)],
-        ..Section::measured(
-            "failures",
-            "Refused, or accepted and wrong",
-            format!("{all} trials; at most {LISTED} are listed, all are in summary.json."),
-        )
-    }
+    let finding = format!("{all} trials; at most {LISTED} are listed, all are in summary.json.");
+    let table = Table::new("failures", "Failures", columns, rows);
+    Section::measured("failures", "Refused, or accepted and wrong", finding).with_table(table)
 }

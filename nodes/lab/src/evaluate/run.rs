@@ -1,21 +1,21 @@
 //! The run of all trials, side by side and timed.
 
 use super::files::write_look;
+use super::global_registration::register;
 use super::initial_guess::perturbed;
 use super::methods::Baseline;
 use super::results::{Results, name};
+use super::runner::{Found, run_jobs};
 use super::settings::{Cell, Plan, Start, check_seeds};
 use super::testbed::{Scenario, Testbed};
 use super::trial::{OURS, TIMED, TRACKED, Trial, rounded};
 use crate::random::seed_of;
 use crate::simulate::house::Scene;
 use crate::{AnyError, pool};
-use lattice_core::registration::{CalibrationOptions, CalibrationRequest, register_global, track};
+use lattice_core::registration::{CalibrationOptions, track};
 use nalgebra::Isometry3;
 use std::collections::HashSet;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc;
 use std::time::Instant;
 
 /// Number of the seeds of starts.
@@ -75,53 +75,22 @@ pub fn run(
         progress(count, total);
         Ok(())
     };
-    side_by_side(testbed, &jobs, threads, &mut keep)?;
-    // Nothing else runs while times are taken.
-    let pool = pool(threads)?;
-    for job in &timed {
+    let pools = (0..threads.max(1)).map(|_| pool(1));
+    let pools = pools.collect::<Result<Vec<_>, _>>()?;
+    let work = |job: &Job, found: &mut Found<Trial>| run_job(testbed, job, None, found);
+    run_jobs(&jobs, pools.len(), &pools, work, &mut keep)?;
+    // Nothing else runs while times are taken, not even the keeping of trials.
+    let looks = plan.looks.as_deref();
+    let work = |job: &Job, found: &mut Found<Vec<Trial>>| {
         let mut trials = Vec::new();
-        let mut found = |trial| {
+        run_job(testbed, job, looks, &mut |trial| {
             trials.push(trial);
             Ok(())
-        };
-        pool.install(|| run_job(testbed, job, plan.looks.as_deref(), &mut found))?;
-        trials.into_iter().try_for_each(&mut keep)?;
-    }
-    Ok(())
-}
-
-/// Each job on one thread, several jobs at once.
-fn side_by_side(
-    testbed: &Testbed,
-    jobs: &[Job],
-    threads: usize,
-    keep: &mut dyn FnMut(Trial) -> Result<(), AnyError>,
-) -> Result<(), AnyError> {
-    let next = AtomicUsize::new(0);
-    let (sender, receiver) = mpsc::channel::<Result<Trial, AnyError>>();
-    std::thread::scope(|scope| {
-        for _ in 0..threads.max(1) {
-            let (sender, next) = (sender.clone(), &next);
-            scope.spawn(move || {
-                let mut found = |trial| {
-                    let sent = sender.send(Ok(trial));
-                    Ok(sent.map_err(|_| "nobody takes the trials any more")?)
-                };
-                let mut work = || {
-                    while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        run_job(testbed, job, None, &mut found)?;
-                    }
-                    Ok(())
-                };
-                if let Err(error) = pool(1).and_then(|pool| pool.install(&mut work)) {
-                    // The receiver is gone only after another error.
-                    let _ = sender.send(Err(error));
-                }
-            });
-        }
-        drop(sender);
-        receiver.into_iter().try_for_each(|trial| keep(trial?))
-    })
+        })?;
+        found(trials)
+    };
+    let mut keep = |trials: Vec<Trial>| trials.into_iter().try_for_each(&mut keep);
+    run_jobs(&timed, 1, &[pool(threads)?], work, &mut keep)
 }
 
 /// The jobs of a plan that are not done; `timed` for those that are measured alone.
@@ -192,7 +161,7 @@ fn run_job(
     testbed: &Testbed,
     job: &Job,
     looks: Option<&Path>,
-    found: &mut (dyn FnMut(Trial) -> Result<(), AnyError> + Send),
+    found: &mut Found<Trial>,
 ) -> Result<(), AnyError> {
     let view = testbed.view(job.scene, job.seed)?;
     for tasks in job.tasks.chunk_by(|a, b| a.cell.q == b.cell.q) {
@@ -237,12 +206,7 @@ fn run_task(scenario: &Scenario, task: &Task, job: &Job) -> Trial {
             trial(&pose, ms(started))
         }
         TaskMethod::Ours | TaskMethod::Timed => {
-            let request = CalibrationRequest {
-                source_clouds: &scenario.headset_scans,
-                start,
-                confusion: None,
-            };
-            let calibration = register_global(&scenario.map, &request, &options, &());
+            let calibration = register(&scenario.map, &scenario.headset_scans, start, &options);
             let wall_ms = ms(started);
             trial(&calibration.target_from_source, wall_ms)
                 .with_judgement(&calibration, &scenario.truth)

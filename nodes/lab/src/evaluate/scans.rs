@@ -1,21 +1,22 @@
 //! Parts of a scan, calibrated in another scan of the same place: real data, whose truth is where the whole scan lies.
 
 use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, SemanticCloud,
-    SourceCloud, Verdict, register_global, voxel_downsample,
+    Calibration, CalibrationMap, CalibrationOptions, SemanticCloud, SourceCloud, Verdict,
+    voxel_downsample,
 };
 use nalgebra::{Isometry3, Point3};
 
 use super::Settings;
+use super::global_registration::register;
 use super::many::{Case, settings_of};
-use super::pairs::{columns, line, of_scenes, shared, trial};
+use super::pairs::{columns, line, of_scenes_and_all, shared, trial};
 use super::settings::Cell;
 use super::trial::{Trial, WRONG};
 use super::views::{any_pose, keep_sector};
 use crate::AnyError;
 use crate::options::within;
 use crate::random::Stream;
-use crate::report::{Cell as Entry, Report, Section, Table};
+use crate::report::{Report, Section};
 
 /// Distance up to which a point has a counterpart in the map, in cells.
 const SHARED_CELLS: f64 = 2.0;
@@ -120,12 +121,7 @@ impl Scans {
     }
 
     fn find(&self, scan: &SourceCloud) -> Calibration {
-        let request = CalibrationRequest {
-            source_clouds: std::slice::from_ref(scan),
-            start: None,
-            confusion: None,
-        };
-        register_global(&self.map, &request, &self.options, &())
+        register(&self.map, std::slice::from_ref(scan), None, &self.options)
     }
 }
 
@@ -154,26 +150,16 @@ impl Case for Part<'_> {
 
 /// Table of results by sector angle.
 pub fn scans_report(trials: &[Trial]) -> Report {
-    let mut scenes = of_scenes(trials);
-    scenes.push(("all".to_owned(), trials.iter().collect()));
-    let rows: Vec<Vec<Entry>> = scenes.iter().map(|(name, of)| line(name, of)).collect();
+    let scenes = of_scenes_and_all(trials);
+    let rows = scenes.iter().map(|(name, of)| line(name, of));
     let title = "Parts of a scan in another scan of the place, without a start";
     let lead = format!(
         "Each part is moved and turned at random first. Right is within {} m and {} degrees of where the whole scan lies; \
          overlap is the share of points with one of the other scan within {SHARED_CELLS} cells.",
         WRONG.m, WRONG.deg
     );
-    let section = Section {
-        tables: vec![Table::new(
-            "scans",
-            title,
-            &columns("part of the circle"),
-            rows,
-        )],
-        ..Section::measured("scans", title, "")
-    };
-    let command = "lattice evaluate scans".to_owned();
-    Report::new(title, lead, command, vec![section])
+    let section = Section::of_table("scans", title, &columns("part of the circle"), rows);
+    Report::of_evaluation(title, lead, "scans", vec![section])
 }
 
 #[cfg(test)]

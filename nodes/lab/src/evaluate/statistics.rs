@@ -87,6 +87,10 @@ pub fn median_interval(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]
     Some([*values.get(outside)?, *values.get(last)?])
 }
 
+pub fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     quantile(values, 0.5)
 }

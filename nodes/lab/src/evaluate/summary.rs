@@ -3,7 +3,7 @@
 mod tables;
 
 use super::settings::Settings;
-use super::statistics::{Share, distinct, median, quantile};
+use super::statistics::{Share, distinct, mean, median, quantile};
 use super::trial::{OURS, TIMED, TRACKED, Trial, WRONG, WRONG_TIGHT};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -208,11 +208,10 @@ fn consistency(ours: &[&Trial]) -> Vec<Consistency> {
     let of_start = |start: &str| {
         let of = taken.iter().filter(|t| is_of(&t.cell.start, start));
         let nees: Vec<f64> = of.filter_map(|t| t.judged.as_ref()?.nees).collect();
-        let mean = nees.iter().sum::<f64>() / nees.len() as f64;
         Consistency {
             start: start.to_owned(),
             n: nees.len(),
-            mean_over_6: (!nees.is_empty()).then_some(mean / 6.0),
+            mean_over_6: mean(&nees).map(|nees| nees / 6.0),
             median_over_expected: median(nees).map(|nees| nees / 5.348),
         }
     };

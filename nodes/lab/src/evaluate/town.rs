@@ -1,16 +1,15 @@
 //! Lidar scans of a simulated street, some metres apart, registered without a start.
 
-use lattice_core::registration::{
-    CalibrationMap, CalibrationRequest, Profile, SourceCloud, register_global, voxel_downsample,
-};
+use lattice_core::registration::{CalibrationMap, Profile, SourceCloud, voxel_downsample};
 use nalgebra::Point3;
 
+use super::global_registration::register;
 use super::many::Case;
-use super::pairs::{columns, line, of_scenes, shared, trial};
+use super::pairs::{by_name, columns, line, shared, trial};
 use super::settings::Cell;
 use super::trial::{Trial, WRONG};
 use crate::AnyError;
-use crate::report::{Cell as Entry, Report, Section, Table};
+use crate::report::{Report, Section};
 use crate::simulate::town::{Lidar, Town, drive};
 
 const CELL_SIDE_M: f64 = 0.3;
@@ -73,46 +72,35 @@ impl Case for Pair {
         let cloud = scan(&second, 1);
         let thinned = voxel_downsample(&cloud, CELL_SIDE_M).points_m;
         let overlap = shared(&thinned, map.cloud(), &truth, SHARED_M);
-        let request = CalibrationRequest {
-            source_clouds: &[SourceCloud {
-                cloud,
-                sensor_m: Some(Point3::origin()),
-            }],
-            start: None,
-            confusion: None,
+        let cloud = SourceCloud {
+            cloud,
+            sensor_m: Some(Point3::origin()),
         };
-        let found = register_global(&map, &request, &Profile::Lidar.options(), &());
+        let found = register(&map, &[cloud], None, &Profile::Lidar.options());
         Ok(trial(cell, &found, &truth, &thinned, overlap))
     }
 }
 
 /// A table of the pairs by distance, and one by overlap.
 pub fn town_report(trials: &[Trial]) -> Report {
-    let mut scenes = of_scenes(trials);
+    let mut scenes = by_name(trials.iter(), |trial| &trial.cell.scene);
     let of_overlap = |much: bool| {
         let is = |t: &&Trial| (t.overlap.unwrap_or(0.0) >= OVERLAP) == much;
         trials.iter().filter(is).collect::<Vec<_>>()
     };
     let percent = 100.0 * OVERLAP;
-    scenes.push((format!("all with {percent} % overlap"), of_overlap(true)));
-    scenes.push(("all with less".to_owned(), of_overlap(false)));
-    let rows: Vec<Vec<Entry>> = scenes.iter().map(|(name, of)| line(name, of)).collect();
+    let all = format!("all with {percent} % overlap");
+    scenes.push((&all, of_overlap(true)));
+    scenes.push(("all with less", of_overlap(false)));
+    let rows = scenes.iter().map(|(name, of)| line(name, of));
     let title = "Lidar scans of a simulated street, without a start";
     let lead = format!(
         "Scans thinned to cells of {CELL_SIDE_M} m; right is within {} m and {} degrees; overlap is the share of points with \
          one of the other scan within {SHARED_M} m.",
         WRONG.m, WRONG.deg
     );
-    let section = Section {
-        tables: vec![Table::new("town", title, &columns("pairs"), rows)],
-        ..Section::measured("town", title, "")
-    };
-    Report::new(
-        title,
-        lead,
-        "lattice evaluate town".to_owned(),
-        vec![section],
-    )
+    let section = Section::of_table("town", title, &columns("pairs"), rows);
+    Report::of_evaluation(title, lead, "town", vec![section])
 }
 
 #[cfg(test)]

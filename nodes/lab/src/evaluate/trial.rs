@@ -165,6 +165,18 @@ impl Trial {
         }
     }
 
+    /// Compares a calibration with the truth. Its time is not kept: it would be taken beside other trials.
+    pub fn of_calibration(
+        cell: &Cell,
+        method: &str,
+        found: &Calibration,
+        truth: &Isometry3<f64>,
+        seen_m: &[Point3<f64>],
+    ) -> Trial {
+        let pose = &found.target_from_source;
+        Trial::of_pose(cell, method, pose, truth, seen_m, 0.0).with_judgement(found, truth)
+    }
+
     pub fn with_judgement(self, calibration: &Calibration, truth: &Isometry3<f64>) -> Trial {
         let (margin, fit) = (calibration.margin, &calibration.fit);
         Trial {

@@ -2,7 +2,9 @@
 //! printed: Ryde & Brünig 2011 (lattices) and Nakamura et al. (calibration).
 
 pub mod calibration;
+mod command;
 mod estimate;
 mod parallel;
+mod sections;
 mod streams;
 pub mod voxels;

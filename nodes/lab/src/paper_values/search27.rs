@@ -4,8 +4,7 @@
 //! Made as fast as the method allows: single precision, squared distances, vectors of the
 //! differences made once, loops that the compiler vectorises for the same instruction sets.
 
-use super::off_by_one;
-use lattice_core::lattice::{BlockKey, Lattice, Simd};
+use lattice_core::lattice::{BlockKey, Lattice, LatticeIndex, Simd};
 use nalgebra::Matrix3;
 
 /// Points that are quantized together.
@@ -14,6 +13,11 @@ const BLOCK: usize = 128;
 const ROUND: f32 = 1.5 * (1_u32 << 23) as f32;
 /// Coordinates in the basis from here on have no cell; one less than the codes have.
 const REACH: f32 = ((1 << 20) - 2) as f32;
+
+/// All 27 index differences with entries -1, 0 and 1; the last entry varies fastest.
+pub fn off_by_one() -> [LatticeIndex; 27] {
+    std::array::from_fn(|i| [i / 9, i / 3 % 3, i % 3].map(|entry| entry as i32 - 1))
+}
 
 type Run = fn(&Constants, &[[f32; 3]; BLOCK], &mut [BlockKey; BLOCK]);
 

@@ -30,7 +30,8 @@ impl Sun {
     pub(super) fn new(scene: &Scene, camera_azimuth_deg: f64, size: [usize; 2]) -> Sun {
         let side = size[0].max(size[1]).min(MAX_SHADOW_SIDE);
         let azimuth_deg = camera_azimuth_deg + SUN_FROM_CAMERA_DEG;
-        let view = View::new(azimuth_deg, SUN_ELEVATION_DEG, [side; 2]).fit(scene);
+        let view = View::new(azimuth_deg, SUN_ELEVATION_DEG, [side; 2])
+            .fit(scene.centers(), scene.radius_m);
         Sun {
             screen: scene.draw(&view),
             view,

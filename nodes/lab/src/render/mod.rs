@@ -4,6 +4,7 @@
 //! screen and one brightness. Sunlight casts shadows, and skylight is dimmed in narrow places.
 
 mod light;
+mod picture_options;
 mod raster;
 mod shade;
 mod view;
@@ -11,8 +12,9 @@ mod view;
 use crate::AnyError;
 use lattice_core::voxels::VoxelList;
 use nalgebra::Vector3;
-use raster::Scene;
-use std::collections::BTreeMap;
+pub use picture_options::{Focus, LabelColors, RenderOptions};
+use raster::{Paint, Scene};
+use shade::SAMPLES;
 use std::io::Write;
 use view::View;
 
@@ -20,57 +22,6 @@ use view::View;
 const MAX_SIDE: u32 = 16_384;
 /// Most pixels of a picture.
 const MAX_PIXELS: u64 = 1 << 24;
-/// Samples a pixel in each direction.
-const SAMPLES: usize = 2;
-
-/// Options of a picture of a map.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct RenderOptions {
-    /// Width, pixels.
-    pub width: u32,
-    /// Height, pixels.
-    pub height: u32,
-    /// Azimuth of the camera seen from the map: degrees clockwise from north.
-    pub azimuth_deg: f64,
-    /// Elevation of the camera over the map: degrees, 90 looks straight down.
-    pub elevation_deg: f64,
-    /// Contrast of light and shadow: 1 as outdoors, 0 none.
-    pub contrast: f64,
-    /// A place to show in place of the whole map, at the same size whatever else there is.
-    pub focus: Option<Focus>,
-}
-
-/// Place that a picture is centred on.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Focus {
-    /// Middle of the picture: map frame, metres.
-    pub center_m: [f64; 3],
-    /// Width of the picture, metres.
-    pub width_m: f64,
-}
-
-/// sRGB colours of labels.
-pub type LabelColors = BTreeMap<u16, [u8; 3]>;
-
-/// Meaning of the colours of cells.
-enum Paint<'a> {
-    Height,
-    Label(&'a LabelColors),
-}
-
-impl Default for RenderOptions {
-    /// Full HD from the south-west.
-    fn default() -> RenderOptions {
-        RenderOptions {
-            width: 1920,
-            height: 1080,
-            azimuth_deg: 215.0,
-            elevation_deg: 35.0,
-            contrast: 1.0,
-            focus: None,
-        }
-    }
-}
 
 /// Draws the exposed faces of a map as a PNG picture, coloured by height.
 ///
@@ -108,7 +59,7 @@ fn render(
             let center_m = Vector3::from(focus.center_m) - list.datum_m();
             view.at(&center_m, focus.width_m)
         }
-        None => view.fit(&scene),
+        None => view.fit(scene.centers(), scene.radius_m),
     };
     let pixels = shade::picture(&scene, &view, options);
 

@@ -1,6 +1,6 @@
 //! Rasterisation: the face that is seen at each sample of the screen.
 
-use super::Paint;
+use super::picture_options::LabelColors;
 use super::view::View;
 use lattice_core::lattice::{Lattice, MortonKey};
 use lattice_core::voxels::VoxelList;
@@ -14,6 +14,12 @@ pub(super) const NOTHING: f32 = f32::NEG_INFINITY;
 const SMALL: f64 = 2.0;
 /// sRGB of cells without a label.
 const NO_LABEL: u8 = 150;
+
+/// Meaning of the colours of cells.
+pub(super) enum Paint<'a> {
+    Height,
+    Label(&'a LabelColors),
+}
 
 /// A map as it is drawn.
 pub(super) struct Scene {

@@ -1,13 +1,15 @@
 //! Shading: the colours of faces on the screen.
 
 use super::light::{Sun, openness};
+use super::picture_options::RenderOptions;
 use super::raster::{NOTHING, Scene, Screen};
 use super::view::View;
-use super::{RenderOptions, SAMPLES};
 use lattice_nodes::files::export::palette::srgb;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+/// Samples a pixel in each direction.
+pub(super) const SAMPLES: usize = 2;
 /// Linear light of the sun, a little warm.
 const SUN: [f64; 3] = [1.02, 0.98, 0.90];
 /// Linear light of the open sky from above, a little blue.

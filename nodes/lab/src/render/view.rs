@@ -1,6 +1,5 @@
 //! Parallel projection.
 
-use super::raster::Scene;
 use crate::evaluate::extent;
 use nalgebra::Vector3;
 
@@ -12,21 +11,21 @@ const MARGIN: f64 = 0.03;
 /// Screen coordinates are in samples, x to the right, y down, the depth in metres towards the
 /// viewer; map coordinates are relative to the datum.
 #[derive(Clone, Debug)]
-pub(super) struct View {
-    pub(super) right: Vector3<f64>,
-    pub(super) up: Vector3<f64>,
-    pub(super) toward: Vector3<f64>,
+pub struct View {
+    pub right: Vector3<f64>,
+    pub up: Vector3<f64>,
+    pub toward: Vector3<f64>,
     /// Width and height, samples.
-    pub(super) size: [usize; 2],
+    pub size: [usize; 2],
     /// Samples a metre.
-    pub(super) scale: f64,
+    pub scale: f64,
     /// Middle of the screen, along right, up and toward, metres.
     middle_m: [f64; 3],
 }
 
 impl View {
     /// A view from a camera at this compass direction and height seen from the map.
-    pub(super) fn new(azimuth_deg: f64, elevation_deg: f64, size: [usize; 2]) -> View {
+    pub fn new(azimuth_deg: f64, elevation_deg: f64, size: [usize; 2]) -> View {
         let (sin_a, cos_a) = azimuth_deg.to_radians().sin_cos();
         let (sin_e, cos_e) = elevation_deg.to_radians().sin_cos();
         let toward = Vector3::new(sin_a * cos_e, cos_a * cos_e, sin_e);
@@ -41,9 +40,9 @@ impl View {
         }
     }
 
-    /// Moves and scales so that the whole scene is seen.
-    pub(super) fn fit(mut self, scene: &Scene) -> View {
-        let centers: Vec<[f64; 3]> = scene.centers().map(|c| self.along(&c)).collect();
+    /// Moves and scales so that all cells are seen: their centres, and their largest extent from these.
+    pub fn fit(mut self, centers: impl Iterator<Item = Vector3<f64>>, radius_m: f64) -> View {
+        let centers: Vec<[f64; 3]> = centers.map(|c| self.along(&c)).collect();
         if centers.is_empty() {
             return self;
         }
@@ -52,7 +51,7 @@ impl View {
         for (axis, side) in sides.into_iter().enumerate() {
             let [low, high] = extent(centers.iter().map(|c| c[axis]));
             self.middle_m[axis] = 0.5 * (low + high);
-            let extent = high - low + 2.0 * scene.radius_m;
+            let extent = high - low + 2.0 * radius_m;
             let scale = side as f64 * (1.0 - 2.0 * MARGIN) / extent;
             self.scale = self.scale.min(scale);
         }
@@ -60,7 +59,7 @@ impl View {
     }
 
     /// Puts a point, relative to the datum, in the middle of a screen that is so wide.
-    pub(super) fn at(mut self, center_m: &Vector3<f64>, width_m: f64) -> View {
+    pub fn at(mut self, center_m: &Vector3<f64>, width_m: f64) -> View {
         self.middle_m = self.along(center_m);
         self.scale = self.size[0] as f64 / width_m;
         self
@@ -71,7 +70,7 @@ impl View {
     }
 
     /// Screen coordinates and depth of a point.
-    pub(super) fn project(&self, p: &Vector3<f64>) -> [f64; 3] {
+    pub fn project(&self, p: &Vector3<f64>) -> [f64; 3] {
         let [x, y, z] = self.along(p);
         let [width, height] = self.size.map(|side| side as f64);
         let [mid_x, mid_y, mid_z] = self.middle_m;
@@ -83,7 +82,7 @@ impl View {
     }
 
     /// The point at screen coordinates and depth; inverse of [`View::project`].
-    pub(super) fn unproject(&self, [x, y, z]: [f64; 3]) -> Vector3<f64> {
+    pub fn unproject(&self, [x, y, z]: [f64; 3]) -> Vector3<f64> {
         let [width, height] = self.size.map(|side| side as f64);
         let [mid_x, mid_y, mid_z] = self.middle_m;
         self.right * ((x - 0.5 * width) / self.scale + mid_x)

@@ -1,7 +1,7 @@
 //! The files of a report: `report.html`, `report.json`, a `.csv` for each table, an `.svg` for each figure.
 
+use super::content::{Cell, Report, Table};
 use super::html::html;
-use super::{Cell, Report, Table};
 use crate::{AnyError, at};
 use lattice_nodes::files::atomic_write;
 use std::fs;

@@ -1,6 +1,6 @@
 //! The HTML of a report: one page with its style and pictures inline, and no scripts.
 
-use super::{Cell, Check, Figure, Report, Section, Table, Verdict, number};
+use super::content::{Cell, Check, Figure, Report, Section, Table, Verdict, number};
 
 /// Rows from which a table is folded away.
 const LONG: usize = 14;

@@ -1,6 +1,6 @@
 //! The Markdown of a report: text and tables for a terminal or a page of documentation.
 
-use super::{Report, Table};
+use super::content::{Report, Table};
 
 /// The report in Markdown; pictures are named as files beside it.
 pub fn markdown(report: &Report) -> String {

@@ -1,6 +1,5 @@
 //! The machine: mounts, timing and the simulation itself.
 
-use super::ins::InsSamples;
 use super::lms200::{self, Lms200Scan, MAX_RANGE_M, SCAN_RATE_HZ, SCAN_SPAN_NS};
 use super::loader::Loader;
 use super::obstacles::Block;
@@ -275,10 +274,5 @@ impl Bobcat {
     /// `measured_from_map`: the constant error of the INS.
     pub(super) fn ins_offset(&self) -> &Isometry3<f64> {
         &self.ins_offset
-    }
-
-    /// The INS epochs from the start of the log to its end.
-    pub fn ins(&self) -> InsSamples<'_> {
-        InsSamples::new(self)
     }
 }

@@ -56,8 +56,15 @@ pub struct InsSamples<'a> {
     next: i64,
 }
 
+impl Bobcat {
+    /// The INS epochs from the start of the log to its end.
+    pub fn ins(&self) -> InsSamples<'_> {
+        InsSamples::new(self)
+    }
+}
+
 impl<'a> InsSamples<'a> {
-    pub(super) fn new(bobcat: &'a Bobcat) -> Self {
+    fn new(bobcat: &'a Bobcat) -> Self {
         let next = bobcat.begin_ns() / INS_PERIOD_NS;
         let mut errors = Errors::new(bobcat.seed());
         for _ in 0..next {

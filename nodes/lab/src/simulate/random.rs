@@ -46,6 +46,11 @@ impl Stream {
         let number = ((purpose as u64).wrapping_add(lane) << 48) | (index & 0xffff_ffff_ffff);
         Self::numbered(seed, number)
     }
+
+    /// Uniform from `low` to `high`, in single precision.
+    pub(super) fn between(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.uniform() as f32
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The messages of the log in their order.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use lattice_bag::{BagQos, BagWriter};
 use lattice_core::voxels::VoxelList;
@@ -13,18 +14,42 @@ use lattice_msgs::{RosMessage, cdr, std_msgs};
 use lattice_nodes::convert::geometry::header;
 use lattice_nodes::convert::headset_mesh::{chunks_for, in_chunks};
 
-use super::{IndoorOptions, SECOND_NS, messages, truth};
+use super::{messages, truth};
 use crate::AnyError;
 use crate::datasets::write::spec;
 use crate::random::seed_of;
 use crate::simulate::house::{HeadsetTrial, House, RoomCamera, RoomImages, robot_views};
 
+pub(super) const SECOND_NS: i64 = 1_000_000_000;
 /// Time between two looks of the headset, and between two of its poses, ns.
 const LOOK_NS: i64 = SECOND_NS;
 const POSE_NS: i64 = SECOND_NS / 10;
 /// Parts of the seeds of noise: whose camera it is.
 const ROBOT: u64 = 0;
 const HEADSET: u64 = 1;
+
+/// Options of the log.
+#[derive(Clone, Debug)]
+pub struct IndoorOptions {
+    /// Directory of the bag.
+    pub out: PathBuf,
+    /// True to replace an earlier log there.
+    pub overwrite: bool,
+    /// Seed of everything; the same seed gives the same messages.
+    pub seed: u64,
+    /// Views of the robot.
+    pub views: usize,
+    /// Time between two of them, s.
+    pub period_s: f64,
+    /// Pixels in a row of the robot's images; those of the headset are as wide.
+    pub width: usize,
+    /// Looks of the headset, one a second.
+    pub looks: usize,
+    /// True for images of colours, false for true labels.
+    pub colors: bool,
+    /// Volume of the cubic cells that the truth is kept in, m^3.
+    pub cell_volume_m3: f64,
+}
 
 /// The log as it grows.
 pub(super) struct Log<'a> {

@@ -26,45 +26,22 @@ use lattice_core::voxels::{Payload, VoxelList};
 use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 
-use self::log::Log;
+use self::log::{Log, SECOND_NS};
 use crate::AnyError;
 use crate::options::within;
 use crate::simulate::house::{HeadsetTrial, House, RoomImages, Scene};
 
+pub use self::log::IndoorOptions;
 pub use truth::{LabelAccuracy, label_accuracy};
 
 /// Time of the first message, UTC, ns since the Unix epoch.
 const START_NS: i64 = 1_700_000_000_000_000_000;
-const SECOND_NS: i64 = 1_000_000_000;
 /// Time between the survey and the headset, ns.
 const PAUSE_NS: i64 = 2 * SECOND_NS;
 /// Pictures of the scene, which the headset looks at in turn.
 const SCANS: usize = 6;
 /// Place of the house in the map, m, and its turn, rad.
 const HOUSE: [f64; 4] = [6.0, -4.0, 0.0, 0.6];
-
-/// Options of the log.
-#[derive(Clone, Debug)]
-pub struct IndoorOptions {
-    /// Directory of the bag.
-    pub out: PathBuf,
-    /// True to replace an earlier log there.
-    pub overwrite: bool,
-    /// Seed of everything; the same seed gives the same messages.
-    pub seed: u64,
-    /// Views of the robot.
-    pub views: usize,
-    /// Time between two of them, s.
-    pub period_s: f64,
-    /// Pixels in a row of the robot's images; those of the headset are as wide.
-    pub width: usize,
-    /// Looks of the headset, one a second.
-    pub looks: usize,
-    /// True for images of colours, false for true labels.
-    pub colors: bool,
-    /// Volume of the cubic cells that the truth is kept in, m^3.
-    pub cell_volume_m3: f64,
-}
 
 /// Log, and the truth that no node knows.
 pub struct Indoor {

@@ -6,14 +6,15 @@ mod scenes;
 
 pub use report::adversarial_report;
 
-use lattice_core::registration::{CalibrationMap, CalibrationRequest, register_global};
+use lattice_core::registration::CalibrationMap;
 
+use super::global_registration::register;
 use super::many::Case;
 use super::settings::Cell;
 use super::trial::{OURS, Trial};
 use crate::AnyError;
 use crate::random::Stream;
-use scenes::{Fault, Look, Object, Scene, small_room};
+use scenes::{ALIKE, BROKEN, Fault, Look, NEARLY, Object, Scene, WRONG_INPUT, small_room};
 
 /// Adversarial scene.
 #[derive(Clone, Copy, Debug)]
@@ -25,12 +26,6 @@ enum Kind {
     SmallRoom(Object),
     Fault(Fault),
 }
-
-/// Kinds of adversarial scenes, the first part of a scene's name.
-const ALIKE: &str = "alike";
-const BROKEN: &str = "broken";
-const NEARLY: &str = "nearly alike";
-const WRONG_INPUT: &str = "wrong input";
 
 impl AdversarialScene {
     /// Cell size of the maps, metres.
@@ -81,15 +76,8 @@ impl Case for AdversarialScene {
         };
         let map = CalibrationMap::new(map, Self::CELL_SIDE_M)?;
         let seen_m = scan.cloud.points_m.clone();
-        let request = CalibrationRequest {
-            source_clouds: &[scan],
-            start: None,
-            confusion: None,
-        };
-        let found = register_global(&map, &request, &options, &());
-        // Times are taken beside other trials: they would say nothing.
-        let trial = Trial::of_pose(cell, OURS, &found.target_from_source, &truth, &seen_m, 0.0);
-        Ok(trial.with_judgement(&found, &truth))
+        let found = register(&map, &[scan], None, &options);
+        Ok(Trial::of_calibration(cell, OURS, &found, &truth, &seen_m))
     }
 }
 

@@ -1,9 +1,9 @@
 //! Report of the adversarial scenes.
 
-use super::scenes::Fault;
-use super::{ALIKE, BROKEN, NEARLY, WRONG_INPUT};
+use super::scenes::{ALIKE, BROKEN, Fault, NEARLY, WRONG_INPUT};
+use crate::evaluate::pairs::{by_name, errors};
 use crate::evaluate::trial::{Trial, WRONG};
-use crate::report::{Cell, Report, Section, Table};
+use crate::report::{Cell, Report, Section};
 
 /// Maximum number of listed wrong answers.
 const LISTED: usize = 40;
@@ -29,7 +29,7 @@ pub fn adversarial_report(trials: &[Trial]) -> Report {
         wrong(trials),
     ];
     let title = "Calibrations that must not be certain";
-    Report::new(title, lead, "lattice evaluate traps".to_owned(), sections)
+    Report::of_evaluation(title, lead, "traps", sections)
 }
 
 fn is_wrong(trial: &Trial) -> bool {
@@ -42,17 +42,9 @@ fn lines(
     kind: &str,
     line: impl Fn(&str, &[&Trial]) -> Vec<Cell>,
 ) -> Vec<Vec<Cell>> {
-    let mut scenes: Vec<(&str, Vec<&Trial>)> = Vec::new();
-    let mut all = Vec::new();
-    for trial in trials.iter().filter(|trial| scene(trial).0 == kind) {
-        let name = scene(trial).1;
-        match scenes.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, of)) => of.push(trial),
-            None => scenes.push((name, vec![trial])),
-        }
-        all.push(trial);
-    }
-    scenes.push(("all", all));
+    let of_kind = trials.iter().filter(|trial| scene(trial).0 == kind);
+    let mut scenes = by_name(of_kind.clone(), |trial| scene(trial).1);
+    scenes.push(("all", of_kind.collect()));
     scenes.iter().map(|(name, of)| line(name, of)).collect()
 }
 
@@ -84,10 +76,7 @@ fn section(trials: &[Trial], kind: &str, title: &str) -> Section {
         ]
     };
     let columns = "scene|trials|OK and right|OK and wrong|AMBIGUOUS|else";
-    Section {
-        tables: vec![Table::new(kind, title, columns, lines(trials, kind, line))],
-        ..Section::measured(kind, title, "")
-    }
+    Section::of_table(kind, title, columns, lines(trials, kind, line))
 }
 
 fn faults(trials: &[Trial]) -> Section {
@@ -110,34 +99,17 @@ fn faults(trials: &[Trial]) -> Section {
     };
     let columns = "cloud|trials|OK and wrong|OK|refused, with the cause named";
     let title = "Clouds that are not what they are said to be";
-    Section {
-        tables: vec![Table::new(
-            "faults",
-            title,
-            columns,
-            lines(trials, WRONG_INPUT, line),
-        )],
-        ..Section::measured("faults", title, "")
-    }
+    Section::of_table("faults", title, columns, lines(trials, WRONG_INPUT, line))
 }
 
 fn wrong(trials: &[Trial]) -> Section {
     let wrong = trials.iter().filter(|trial| is_wrong(trial)).take(LISTED);
     let line = |trial: &Trial| -> Vec<Cell> {
-        vec![
-            trial.cell.scene.as_str().into(),
-            trial.cell.seed.to_string().into(),
-            Cell::Number(trial.translation_m, 3),
-            Cell::Number(trial.rotation_deg, 2),
-            Cell::number(trial.judged.as_ref().and_then(|j| j.margin), 0),
-            Cell::number(trial.judged.as_ref().map(|j| 100.0 * j.inliers), 0),
-        ]
+        let names = [trial.cell.scene.clone(), trial.cell.seed.to_string()];
+        let names = names.map(Cell::from);
+        names.into_iter().chain(errors(trial)).collect()
     };
-    let rows: Vec<Vec<Cell>> = wrong.map(line).collect();
     let columns = "scene|seed|m|degrees|log-margin|% on the map";
     let title = "Answers that were OK and wrong";
-    Section {
-        tables: vec![Table::new("wrong", title, columns, rows)],
-        ..Section::measured("wrong", title, "")
-    }
+    Section::of_table("wrong", title, columns, wrong.map(line))
 }

@@ -7,6 +7,12 @@ use lattice_core::pose::Axes;
 use lattice_core::registration::{CalibrationOptions, SemanticCloud, SourceCloud};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
+/// Kinds of adversarial scenes, the first part of a scene's name.
+pub(super) const ALIKE: &str = "alike";
+pub(super) const BROKEN: &str = "broken";
+pub(super) const NEARLY: &str = "nearly alike";
+pub(super) const WRONG_INPUT: &str = "wrong input";
+
 /// A map and a scan, with the truth.
 pub(super) struct Scene {
     pub map: SemanticCloud,

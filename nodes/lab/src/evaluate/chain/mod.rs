@@ -4,26 +4,28 @@
 //! truth.
 
 mod devices;
+mod methods;
 mod report;
 
 pub use report::chain_report;
 
 use std::collections::{BTreeSet, HashSet};
 use std::path::PathBuf;
-use std::sync::{Mutex, OnceLock, mpsc};
+use std::sync::{Mutex, OnceLock};
 
 use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_core::registration::{
-    CalibrationMap, CalibrationOptions, CalibrationRequest, PrepareOptions, PreparedCloud,
-    SemanticCloud, SourceCloud, register_global, voxel_downsample,
+    CalibrationMap, CalibrationOptions, PrepareOptions, PreparedCloud, SemanticCloud, SourceCloud,
+    voxel_downsample,
 };
 use lattice_nodes::segmenter::{Segmenter, SegmenterOptions, read_network};
 use nalgebra::{Isometry3, Point3};
-use rayon::prelude::*;
 
+use super::global_registration::register;
 use super::initial_guess::perturbed;
 use super::methods::Baseline;
 use super::results::name;
+use super::runner::{Found, run_jobs};
 use super::settings::{Cell, Settings, Start, check_seeds};
 use super::trial::{LabelsRight, OURS, Trial, rounded};
 use super::{Results, read_house};
@@ -35,6 +37,7 @@ use devices::{
     Both, headset_mesh, headset_scan, house_from_headset, middle_m, right_share, robot_map,
     together, unlabelled,
 };
+use methods::{COMPETITOR, STARTS, TRUE_LABELS, UNLABELLED};
 
 /// Purposes of seeds.
 const VIEW: u64 = 11;
@@ -43,16 +46,6 @@ const LOOK: u64 = 13;
 const IMAGE: u64 = 14;
 const START: u64 = 15;
 
-/// Ours without any labels, and with true ones.
-pub const UNLABELLED: &str = "ours_unlabelled";
-/// Ours with true labels.
-pub const TRUE_LABELS: &str = "ours_true_labels";
-/// The competitor, with the starts that it gets.
-pub const COMPETITOR: &str = "gicp_se3";
-const STARTS: [Start; 2] = [
-    Start::Off { m: 0.3, deg: 10.0 },
-    Start::Off { m: 0.8, deg: 35.0 },
-];
 /// Distance within which a point of the headset is compared with one of the map, metres.
 const SHARED_M: f64 = 0.15;
 
@@ -137,29 +130,19 @@ pub fn run_chain(
     // Before the trials: a thread of the pool that waited in one for a survey could have begun that survey itself.
     let numbers: BTreeSet<u64> = left.iter().map(|(seed, _)| seed % options.maps).collect();
     pool.install(|| numbers.iter().try_for_each(|&n| chain.place(n).map(|_| ())))?;
-    let (sender, receiver) = mpsc::channel();
-    std::thread::scope(|scope| {
-        let (left, chain) = (&left, &chain);
-        scope.spawn(move || {
-            pool.install(|| {
-                // The receiver is gone only after an error: then no more trials begin.
-                let trials = left.par_iter().with_max_len(1);
-                let _ = trials.try_for_each(|&(seed, scene)| {
-                    let sent = sender.send(chain.trials(seed, scene));
-                    sent.map_err(drop)
-                });
-            });
-        });
-        for (i, trials) in receiver.into_iter().enumerate() {
-            for trial in trials? {
-                if !done.contains(&name(&trial.cell, &trial.method)) {
-                    results.add(trial)?;
-                }
-            }
-            progress(i + 1, left.len());
-        }
+    let work = |&(seed, scene): &(u64, Scene), found: &mut Found<Vec<Trial>>| {
+        found(chain.trials(seed, scene)?)
+    };
+    let mut count = 0;
+    let mut keep = |trials: Vec<Trial>| {
+        let new = |trial: &Trial| !done.contains(&name(&trial.cell, &trial.method));
+        let mut new = trials.into_iter().filter(new);
+        new.try_for_each(|trial| results.add(trial))?;
+        count += 1;
+        progress(count, left.len());
         Ok(())
-    })
+    };
+    run_jobs(&left, options.threads.max(1), &[pool], work, &mut keep)
 }
 
 fn cell(seed: u64, scene: Scene, start: Start) -> Cell {
@@ -256,19 +239,11 @@ impl Chain<'_> {
             (UNLABELLED, &place.unlabelled, &bare, &seen_bare),
             (TRUE_LABELS, &place.map.truth, &right, &seen_right),
         ] {
-            let request = CalibrationRequest {
-                source_clouds: headset_scans,
-                start: None,
-                confusion: None,
-            };
-            let found = register_global(map, &request, &CalibrationOptions::default(), &());
-            let pose = &found.target_from_source;
-            // Times are taken beside other trials: they would say nothing.
-            let trial = Trial::of_pose(&none, method, pose, &truth, &cloud.points_m, 0.0);
+            let found = register(map, headset_scans, None, &CalibrationOptions::default());
             trials.push(Trial {
                 labels: (method == OURS).then_some(labels),
                 different_share: rounded(different_share(map, cloud, &truth)),
-                ..trial.with_judgement(&found, &truth)
+                ..Trial::of_calibration(&none, method, &found, &truth, &cloud.points_m)
             });
         }
         let source = voxel_downsample(&seen, self.cell_side_m);

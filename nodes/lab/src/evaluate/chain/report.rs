@@ -1,8 +1,9 @@
 //! The report of the chain.
 
+use super::super::pairs::errors;
 use super::super::statistics::{Share, median};
 use super::super::trial::{OURS, Trial, WRONG};
-use super::{COMPETITOR, STARTS, TRUE_LABELS, UNLABELLED};
+use super::methods::{COMPETITOR, STARTS, TRUE_LABELS, UNLABELLED};
 use crate::evaluate::settings::Start;
 use crate::report::{Cell, Report, Section, Table};
 
@@ -19,7 +20,7 @@ pub fn chain_report(trials: &[Trial]) -> Report {
         WRONG.m, WRONG.deg, GOALS[0], GOALS[1]
     );
     let sections = vec![methods(trials), scenes(trials), wrong(trials)];
-    Report::new(title, lead, "lattice evaluate chain".to_owned(), sections)
+    Report::of_evaluation(title, lead, "chain", sections)
 }
 
 fn methods(trials: &[Trial]) -> Section {
@@ -48,10 +49,7 @@ fn methods(trials: &[Trial]) -> Section {
     let rows = ours.into_iter().chain(others);
     let columns = "method|trials|right|OK|of the OK wrong|median error of the right (m)";
     let title = "What labels of the network are worth";
-    Section {
-        tables: vec![Table::new("methods", title, columns, rows.map(line))],
-        ..Section::measured("methods", title, "")
-    }
+    Section::of_table("methods", title, columns, rows.map(line))
 }
 
 /// Shares of right answers, of OK, and of wrong ones among them; the median error of the right.
@@ -97,14 +95,9 @@ fn scenes(trials: &[Trial]) -> Section {
     let columns = "scene|right|OK|of the OK wrong|median error of the right (m)|voxels of the map rightly labelled (%)|\
                    points of the headset rightly labelled (%)|points that differ from the map (%)";
     let title = "Ours with labels of the network, by scene";
-    Section {
-        tables: vec![Table::new("scenes", title, columns, rows)],
-        ..Section::measured(
-            "scenes",
-            title,
-            "Shares of labels are medians of the trials.",
-        )
-    }
+    let finding = "Shares of labels are medians of the trials.";
+    let table = Table::new("scenes", title, columns, rows);
+    Section::measured("scenes", title, finding).with_table(table)
 }
 
 fn wrong(trials: &[Trial]) -> Section {
@@ -112,22 +105,11 @@ fn wrong(trials: &[Trial]) -> Section {
     let failed = ours.filter(|t| !t.is_accepted() || !t.is_within(WRONG));
     let line = |t: &Trial| -> Vec<Cell> {
         let verdict = t.judged.as_ref().map_or("", |j| j.verdict.as_str());
-        vec![
-            t.method.as_str().into(),
-            t.cell.scene.as_str().into(),
-            t.cell.seed.to_string().into(),
-            verdict.into(),
-            Cell::Number(t.translation_m, 3),
-            Cell::Number(t.rotation_deg, 2),
-            Cell::number(t.judged.as_ref().and_then(|j| j.margin), 0),
-            Cell::number(t.judged.as_ref().map(|j| 100.0 * j.inliers), 0),
-        ]
+        let seed = t.cell.seed.to_string();
+        let names = [t.method.as_str(), &t.cell.scene, &seed, verdict].map(Cell::from);
+        names.into_iter().chain(errors(t)).collect()
     };
-    let rows: Vec<Vec<Cell>> = failed.map(line).collect();
     let columns = "method|scene|seed|verdict|m|degrees|log-margin|% on the map";
     let title = "Answers of ours that were wrong or not OK";
-    Section {
-        tables: vec![Table::new("failed", title, columns, rows)],
-        ..Section::measured("failed", title, "")
-    }
+    Section::of_table("failed", title, columns, failed.map(line))
 }

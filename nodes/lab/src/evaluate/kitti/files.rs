@@ -1,7 +1,7 @@
 //! Scans for other programs.
 
-use super::Prepared;
-use crate::evaluate::files::write_cloud;
+use super::measure::Prepared;
+use crate::labelled_ply::write_cloud;
 use crate::{AnyError, at};
 use lattice_core::registration::SemanticCloud;
 use std::fs;

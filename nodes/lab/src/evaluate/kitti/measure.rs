@@ -1,16 +1,21 @@
 //! Pairs of scans and the results of each method on them.
 
-use super::{KittiMethod, RIGHT, Scan};
+use super::methods::KittiMethod;
+use super::scans::Scan;
 use crate::AnyError;
 use crate::bench::timed;
-use crate::evaluate::trial::rounded;
+use crate::evaluate::global_registration;
+use crate::evaluate::trial::{Bounds, rounded};
 use crate::metrics::PoseError;
 use lattice_core::registration::{
-    CalibrationMap, CalibrationRequest, PrepareOptions, PreparedCloud, Profile, SemanticCloud,
-    SourceCloud, register, register_global, voxel_downsample,
+    CalibrationMap, PrepareOptions, PreparedCloud, Profile, SemanticCloud, SourceCloud, register,
+    voxel_downsample,
 };
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde::Serialize;
+
+/// Error bounds of a correct pose: 0.15 m and 0.3 degrees.
+pub const RIGHT: Bounds = Bounds { m: 0.15, deg: 0.3 };
 
 /// Two scans, of which the first is moved.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -174,14 +179,10 @@ impl Pair {
                     cloud: cloud.clone(),
                     sensor_m: Some(Point3::origin()),
                 }];
-                let request = CalibrationRequest {
-                    source_clouds: &headset_scans,
-                    start,
-                    confusion: None,
-                };
                 let options = Profile::Lidar.options();
-                let (found, spent) =
-                    timed(|| register_global(&target.map, &request, &options, &()));
+                let (found, spent) = timed(|| {
+                    global_registration::register(&target.map, &headset_scans, start, &options)
+                });
                 PairRow {
                     register_ms: 1e3 * spent.cpu_s,
                     verdict: Some(found.verdict.name().to_owned()),

@@ -11,10 +11,7 @@ mod report;
 mod scans;
 
 pub use files::write_scans;
-pub use measure::{KittiReport, Pair, PairRow, Prepared, pairs_of};
+pub use measure::{KittiReport, Pair, PairRow, Prepared, RIGHT, pairs_of};
 pub use methods::KittiMethod;
 pub use report::kitti_report;
 pub use scans::{KittiTopics, Scan, read_scans};
-
-/// Error bounds of a correct pose: 0.15 m and 0.3 degrees.
-pub const RIGHT: super::Bounds = super::Bounds { m: 0.15, deg: 0.3 };

@@ -1,6 +1,6 @@
 //! The report of a comparison on laser scans.
 
-use super::{KittiReport, PairRow};
+use super::measure::{KittiReport, PairRow};
 use crate::evaluate::median;
 use crate::report::{Cell, Report, Section, Table};
 
@@ -27,12 +27,10 @@ pub fn kitti_report(report: &KittiReport) -> Report {
         report.right_deg
     );
     let title = "Registration of labelled laser scans";
-    let command = format!("lattice evaluate kitti --cell {}", report.cell_m);
-    let section = Section {
-        tables: vec![Table::new("kitti", "All methods and starts", columns, rows)],
-        ..Section::measured("kitti", "Methods against the truth of an INS", "")
-    };
-    Report::new(title, lead, command, vec![section])
+    let table = Table::new("kitti", "All methods and starts", columns, rows);
+    let section = Section::measured("kitti", "Methods against the truth of an INS", "");
+    let words = format!("kitti --cell {}", report.cell_m);
+    Report::of_evaluation(title, lead, &words, vec![section.with_table(table)])
 }
 
 fn line(first: &PairRow, rows: &[&PairRow]) -> Vec<Cell> {

@@ -7,7 +7,9 @@ use lattice_nodes::enu_transformer::TransformerOptions;
 use lattice_nodes::lidar_odometry::{DriveLoops, LidarOdometry, LidarOdometryOptions};
 use lattice_nodes::replay::{OdometryInput, TopicWishes, feed_odometry, plan};
 
-use super::{LoopTrial, Measurement, OdometryTrial, report_of};
+use super::loops::LoopTrial;
+use super::measurement::{Measurement, OdometryTrial};
+use super::report::report_of;
 use crate::bench::timed;
 use crate::poses::read_tum;
 use crate::report::Report;

@@ -7,7 +7,8 @@ use lattice_core::odometry::ScanResult;
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
-use super::WRONG_M;
+/// Error of a pose that must not be called `OK`, and of a false loop, m.
+pub(super) const WRONG_M: f64 = 1.0;
 
 /// Loops of one drive.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

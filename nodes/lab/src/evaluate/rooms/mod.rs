@@ -7,15 +7,13 @@ mod room;
 
 pub use report::rooms_report;
 
-use lattice_core::registration::{
-    Calibration, CalibrationMap, CalibrationOptions, CalibrationRequest, SemanticCloud,
-    register_global,
-};
+use lattice_core::registration::{Calibration, CalibrationMap, CalibrationOptions, SemanticCloud};
 use nalgebra::{Isometry3, Matrix3x6, Point3, Vector3};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::global_registration::register;
 use super::many::Case;
 use super::settings::{Cell, Settings};
 use super::settings_of;
@@ -79,17 +77,10 @@ impl Case for RoomCase {
         let truth = any_pose(random);
         let look = self.room.look(&truth, random)?;
         let seen_m = look.cloud.points_m.clone();
-        let request = CalibrationRequest {
-            source_clouds: &[look],
-            start: None,
-            confusion: None,
-        };
-        let found = register_global(&map, &request, &CalibrationOptions::default(), &());
-        // Times are taken beside other trials: they would say nothing.
-        let trial = Trial::of_pose(cell, OURS, &found.target_from_source, &truth, &seen_m, 0.0);
+        let found = register(&map, &[look], None, &CalibrationOptions::default());
         Ok(Trial {
             middle: Some(middle(&found, &truth, &seen_m)),
-            ..trial.with_judgement(&found, &truth)
+            ..Trial::of_calibration(cell, OURS, &found, &truth, &seen_m)
         })
     }
 }

@@ -1,6 +1,6 @@
 //! Report of calibrations in captured rooms.
 
-use crate::evaluate::pairs::of_scenes;
+use crate::evaluate::pairs::of_scenes_and_all;
 use crate::evaluate::trial::Trial;
 use crate::report::{Cell, Report, Section, Table};
 
@@ -19,25 +19,13 @@ pub fn rooms_report(trials: &[Trial]) -> Report {
         trials.len()
     );
     let title = "A headset and a robot that see tables from opposite sides";
-    let mut scenes = of_scenes(trials);
-    scenes.push(("all".to_owned(), trials.iter().collect()));
-    let rows: Vec<Vec<Cell>> = scenes.iter().map(|(name, of)| line(name, of)).collect();
+    let scenes = of_scenes_and_all(trials);
+    let rows = scenes.iter().map(|(name, of)| line(name, of));
     let columns = "room|trials|OK|OK, off by more than 0.05 m|OK, off by more than 3 sigmas|AMBIGUOUS|DEGENERATE|else|\
                    median of OK, m|largest of OK, m";
-    let tables = vec![
-        Table::new("rooms", title, columns, rows),
-        Table::new("off", OFF, OFF_COLUMNS, off(trials)),
-    ];
-    let section = Section {
-        tables,
-        ..Section::measured("rooms", title, "")
-    };
-    Report::new(
-        title,
-        lead,
-        "lattice evaluate rooms".to_owned(),
-        vec![section],
-    )
+    let off = Table::new("off", OFF, OFF_COLUMNS, off(trials));
+    let section = Section::of_table("rooms", title, columns, rows).with_table(off);
+    Report::of_evaluation(title, lead, "rooms", vec![section])
 }
 
 const OFF: &str = "Poses that were OK and off";

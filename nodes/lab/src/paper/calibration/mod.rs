@@ -1,16 +1,19 @@
 //! Nakamura et al. 2019, "Calibration System Using Semantic-ICP for Visualization of Robot Spatial Perception Through
 //! Mixed Reality", computed anew.
 
+mod context;
 mod equations;
 mod label_maps;
-mod metric;
 mod trials;
 
 use crate::evaluate::{Results, Settings, Testbed, Trial, read_house};
+use crate::paper::command;
+use crate::paper::sections::{Part, in_order};
 use crate::report::{Report, Section};
-use crate::simulate::house::House;
 use crate::{AnyError, at};
+use context::Context;
 use std::path::PathBuf;
+use std::slice;
 
 /// Options of the report.
 #[derive(Clone, Debug)]
@@ -32,48 +35,32 @@ const SEEDS_EACH: u64 = 1000;
 /// Views of the robot's survey in a quick run.
 const QUICK_VIEWS: usize = 192;
 
-/// Testbed and options that the sections share.
-struct Context {
-    testbed: Testbed,
-    seed: u64,
-    /// Seed of the first trial.
-    first_seed: u64,
-    quick: bool,
-    threads: usize,
-    /// Side of a cell of the robot's map, metres.
-    cell_side_m: f64,
-}
+type Make = fn(&Context, &mut dyn FnMut(f64)) -> Result<Vec<Section>, AnyError>;
+
+/// Sections in the order of the report.
+const SECTIONS: [Part<Make>; 3] = [
+    ("equations", 8.0, equations::sections),
+    ("Table 1", 85.0, trials::sections),
+    ("Figs. 3 and 4", 5.0, label_maps::sections),
+];
 
 /// Computes all sections; `progress` gets the share done and the name of the next section.
 pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Report, AnyError> {
-    let sections = sections(options, progress)?;
+    progress(0.0, "house");
+    let context = context(options)?;
+    let sections = in_order(&SECTIONS, progress, |make, tell| make(&context, tell))?;
     let title = "Nakamura, El Hafi, Hagiwara and Taniguchi 2019, Calibration System Using Semantic-ICP for Visualization of Robot \
                  Spatial Perception Through Mixed Reality";
     let command = command(options);
     Ok(Report::of_paper(title, command, options.quick, sections))
 }
 
-fn sections(
-    options: &Options,
-    progress: &mut dyn FnMut(f64, &str),
-) -> Result<Vec<Section>, AnyError> {
-    progress(0.0, "house");
+fn context(options: &Options) -> Result<Context, AnyError> {
     let (house, mesh_crc32) = read_house(options.mesh.as_ref(), options.seed)?;
-    let (settings, trials) = evaluated(options, mesh_crc32)?;
-    let context = context(options, house, &settings)?;
-    let mut tell = |done: f64| progress(0.02 + 0.08 * done, "equations");
-    let mut sections = equations::sections(&context, &mut tell)?;
-    sections.push(metric::section(&context)?);
-    let mut tell = |done: f64| progress(0.1 + 0.85 * done, "Table 1");
-    sections.extend(trials::sections(&context, trials, &mut tell)?);
-    let mut tell = |done: f64| progress(0.95 + 0.05 * done, "Figs. 3 and 4");
-    sections.extend(label_maps::sections(&context, &mut tell)?);
-    Ok(sections)
-}
-
-fn context(options: &Options, house: House, settings: &Settings) -> Result<Context, AnyError> {
+    let (settings, evaluated) = evaluated(options, mesh_crc32)?;
     Ok(Context {
-        testbed: Testbed::new(house, settings)?,
+        testbed: Testbed::new(house, &settings)?,
+        evaluated,
         seed: options.seed,
         first_seed: options.seed.wrapping_sub(1).wrapping_mul(SEEDS_EACH),
         quick: options.quick,
@@ -112,24 +99,13 @@ fn evaluated(
     Ok((settings, Some(trials)))
 }
 
-/// The command line, with the names of files but not where they lie.
+/// The command line, with the names of files.
 fn command(options: &Options) -> String {
-    let mut words = format!("lattice paper calibration --seed {}", options.seed);
-    if options.quick {
-        words.push_str(" --quick");
-    }
-    let mut named = |option: &str, path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        words.push_str(&format!(" --{option} {name}"));
-    };
-    if let Some((mesh, classes)) = &options.mesh {
-        named("mesh", mesh);
-        named("classes", classes);
-    }
-    if let Some(results) = &options.results {
-        named("results", results);
-    }
-    words
+    let mesh = options.mesh.iter();
+    let mesh = mesh.flat_map(|(mesh, classes)| [("mesh", mesh), ("classes", classes)]);
+    let files = mesh.chain(options.results.iter().map(|folder| ("results", folder)));
+    let files = files.map(|(option, path)| (option, slice::from_ref(path)));
+    command::command("calibration", (options.seed, options.quick), files)
 }
 
 #[cfg(test)]
@@ -162,12 +138,12 @@ mod tests {
         };
         let on = |threads: usize| {
             let all = || {
-                let (house, mesh_crc32) = read_house(None, options.seed).unwrap();
-                let (settings, _) = evaluated(&options, mesh_crc32).unwrap();
-                let context = context(&options, house, &settings).unwrap();
-                let mut sections = equations::sections(&context, &mut |_| {}).unwrap();
-                sections.push(metric::section(&context).unwrap());
-                sections.extend(label_maps::sections(&context, &mut |_| {}).unwrap());
+                let context = context(&options).unwrap();
+                // Trials take most of the time; their loop has a test of its own.
+                let quick = SECTIONS.iter().filter(|(name, ..)| *name != "Table 1");
+                let make = |(_, _, make): &Part<Make>| make(&context, &mut |_| {}).unwrap();
+                let sections: Vec<Section> = quick.flat_map(make).collect();
+                assert_eq!(sections.len(), 6);
                 // With the pictures, which JSON leaves out.
                 format!("{sections:?}")
             };

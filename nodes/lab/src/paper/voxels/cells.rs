@@ -1,6 +1,6 @@
 //! Fig. 1: the Voronoi cells, drawn.
 
-use super::{Options, unit};
+use super::report_options::Options;
 use crate::AnyError;
 use crate::report::plot::{color, title};
 use crate::report::{Cell, Check, Figure, Section, Table, Verdict, numbers};
@@ -39,7 +39,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
     let mut checks = Vec::new();
     let mut rows = Vec::new();
     for (kind, corners, faces, shape) in SHAPES {
-        let lattice = unit(kind)?;
+        let lattice = Lattice::new(kind, 1.0)?;
         let cell = lattice.cell();
         let name = title(kind);
         let volume = format!("{name}: volume");
@@ -91,7 +91,7 @@ fn draw() -> Result<String, AnyError> {
     for (i, (kind, _, _, shape)) in SHAPES.into_iter().enumerate() {
         let x = TILE * ((i % columns) as f64 + 0.5);
         let y = (TILE + NAME) * (i / columns) as f64 + TILE / 2.0;
-        draw_cell(&mut svg, &unit(kind)?, x, y)?;
+        draw_cell(&mut svg, &Lattice::new(kind, 1.0)?, x, y)?;
         let short = shape.split(',').next().unwrap_or(shape);
         writeln!(
             svg,

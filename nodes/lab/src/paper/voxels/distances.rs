@@ -1,6 +1,6 @@
 //! Fig. 3: the ordered distances of the adjacent lattice points.
 
-use super::{Options, unit};
+use super::report_options::Options;
 use crate::AnyError;
 use crate::report::plot::{Layout, chart, color, key, svg, title};
 use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
@@ -66,7 +66,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
     let mut rows = Vec::new();
     for (kind, expected) in SHELLS {
         let name = title(kind);
-        let distances = ordered(&unit(kind)?);
+        let distances = ordered(&Lattice::new(kind, 1.0)?);
         let found = shells(&distances);
         for (i, &(count, distance)) in expected.iter().enumerate() {
             let (n, m) = found.get(i).copied().unwrap_or((0, f64::NAN));
@@ -86,7 +86,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
     }
     let mut near = Vec::new();
     for (kind, expected) in CLEARANCES {
-        let lattice = unit(kind)?;
+        let lattice = Lattice::new(kind, 1.0)?;
         let found = touching_clearance_m(&lattice);
         let what = "safe distance of the touching cells (cell sides)";
         let what = format!("{}: {what}", title(kind));
@@ -99,7 +99,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
         near.push(row);
     }
     // A vertex neighbour of FCC is at distance 0 and not in the printed set.
-    let fcc = unit(LatticeKind::Fcc)?;
+    let fcc = Lattice::new(LatticeKind::Fcc, 1.0)?;
     let others = fcc.touching_neighbors().iter();
     let others = others.skip(fcc.face_neighbors().len());
     let gap = others.map(|&w| distance_between_cells_m(&fcc, w));
@@ -155,7 +155,7 @@ fn draw() -> Result<String, AnyError> {
         let mut chart = chart(area, "", x, ("distance (cell sides)", 0.75..1.85), &[])?;
         for kind in kinds {
             let color = color(kind);
-            let distances = ordered(&unit(kind)?);
+            let distances = ordered(&Lattice::new(kind, 1.0)?);
             let at =
                 |(i, &(distance, face)): (usize, &(f64, bool))| ((i + 1) as f64, distance, face);
             let points: Vec<_> = distances.iter().enumerate().map(at).collect();

@@ -1,11 +1,11 @@
 //! Eq. (8)-(12): the generator matrices.
 
-use super::{Options, unit};
+use super::report_options::Options;
 use crate::AnyError;
 use crate::paper_values::printed_generator;
 use crate::report::plot::title;
 use crate::report::{Cell, Check, Section, Table, Verdict};
-use lattice_core::lattice::LatticeKind;
+use lattice_core::lattice::{Lattice, LatticeKind};
 
 /// Determinants of the printed digits, worked out elsewhere.
 const PRINTED_DETERMINANTS: [(LatticeKind, f64); 5] = [
@@ -21,7 +21,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
     let mut rows = Vec::new();
     let mut worst_drift = (0.0, LatticeKind::Cubic);
     for (kind, determinant) in PRINTED_DETERMINANTS {
-        let exact = unit(kind)?.generator();
+        let exact = Lattice::new(kind, 1.0)?.generator();
         let printed = printed_generator(kind).unwrap_or(exact);
         let name = title(kind);
         let off = (printed - exact).amax();

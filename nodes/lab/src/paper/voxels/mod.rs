@@ -9,39 +9,23 @@ mod matching;
 mod neighbors;
 mod quantization;
 mod radial;
+mod report_options;
 mod rotations;
 mod sample;
 mod scan;
 mod theory;
 
+use crate::paper::command::command;
+use crate::paper::sections::{Part, in_order};
 use crate::report::{Report, Section};
 use crate::{AnyError, at};
-use lattice_core::lattice::{Lattice, LatticeIndex, LatticeKind};
-use std::borrow::Cow;
-use std::fs;
-use std::path::{Path, PathBuf};
-
-/// Options of the report.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// The same seed gives the same bytes.
-    pub seed: u64,
-    /// Fewer samples and trials.
-    pub quick: bool,
-    /// Point files of single scans, for Fig. 5.
-    pub scans: Vec<PathBuf>,
-    /// Logs, for Table I.
-    pub bags: Vec<PathBuf>,
-    /// Folder of pairs of scans, for Fig. 6.
-    pub pairs: Option<PathBuf>,
-    /// Further pairs: file of the map's scan, of the scan that is matched, and of its pose in the map.
-    pub pair_files: Vec<[PathBuf; 3]>,
-}
+pub use report_options::Options;
+use std::{fs, slice};
 
 type Make = fn(&Options, &mut dyn FnMut(f64)) -> Result<Section, AnyError>;
 
-/// Name, share of the time, and what makes it; in the order of the paper.
-const SECTIONS: [(&str, f64, Make); 10] = [
+/// Sections in the order of the paper.
+const SECTIONS: [Part<Make>; 10] = [
     ("cells", 0.1, cells::section),
     ("eq. (1)-(2)", 3.0, quantization::section),
     ("eq. (3)-(7)", 0.1, neighbors::section),
@@ -62,53 +46,17 @@ pub fn run(options: &Options, progress: &mut dyn FnMut(f64, &str)) -> Result<Rep
     for path in files.chain(&options.pairs) {
         fs::metadata(path).map_err(at(path))?;
     }
-    let all: f64 = SECTIONS.iter().map(|(_, share, _)| share).sum();
-    let mut before = 0.0;
-    let mut sections = Vec::new();
-    for (name, share, make) in SECTIONS {
-        progress(before / all, name);
-        let mut tell = |done: f64| progress((before + share * done) / all, name);
-        sections.push(make(options, &mut tell)?);
-        before += share;
-    }
+    let make = |make: Make, tell: &mut dyn FnMut(f64)| Ok(vec![make(options, tell)?]);
+    let sections = in_order(&SECTIONS, progress, make)?;
     let title = "Ryde and Brünig 2011, Lattice Occupied Voxel Lists for Representation of Spatial Occupancy";
-    let command = command(options);
+    let one = |option: &'static str| move |path| (option, slice::from_ref(path));
+    let files = options.scans.iter().map(one("scan"));
+    let files = files.chain(options.bags.iter().map(one("bag")));
+    let files = files.chain(options.pairs.iter().map(one("pairs")));
+    let pairs = options.pair_files.iter();
+    let files = files.chain(pairs.map(|files| ("pair", files.as_slice())));
+    let command = command("voxels", (options.seed, options.quick), files);
     Ok(Report::of_paper(title, command, options.quick, sections))
-}
-
-/// The command line, with the names of files but not where they lie.
-fn command(options: &Options) -> String {
-    let mut words = format!("lattice paper voxels --seed {}", options.seed);
-    if options.quick {
-        words.push_str(" --quick");
-    }
-    let named = |option: &str, path: &PathBuf| format!(" --{option} {}", file_name(path));
-    words.extend(options.scans.iter().map(|path| named("scan", path)));
-    words.extend(options.bags.iter().map(|path| named("bag", path)));
-    words.extend(options.pairs.iter().map(|path| named("pairs", path)));
-    for [map, scan, pose] in &options.pair_files {
-        words.push_str(&named("pair", map));
-        words.extend([scan, pose].map(|path| format!(" {}", file_name(path))));
-    }
-    words
-}
-
-fn file_name(path: &Path) -> Cow<'_, str> {
-    path.file_name().unwrap_or_default().to_string_lossy()
-}
-
-/// The lattice with cells of 1 m^3.
-fn unit(kind: LatticeKind) -> Result<Lattice, AnyError> {
-    Ok(Lattice::new(kind, 1.0)?)
-}
-
-/// One of each pair of opposite differences, written "±(1,0,0)".
-fn pairs(differences: impl IntoIterator<Item = LatticeIndex>) -> String {
-    let half = differences.into_iter().filter(|w| *w > [0; 3]);
-    let mut half: Vec<LatticeIndex> = half.collect();
-    half.sort_unstable();
-    let words = half.iter().map(|[a, b, c]| format!("±({a},{b},{c})"));
-    words.collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Eq. (3)-(7): the printed sets of differences against the cells that share a face or touch.
 
-use super::{Options, pairs, unit};
+use super::report_options::Options;
 use crate::AnyError;
 use crate::paper_values::printed_delta;
 use crate::report::plot::title;
@@ -25,7 +25,7 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
     let mut checks = Vec::new();
     let mut rows = Vec::new();
     for (kind, columns, faces, touching) in COUNTS {
-        let lattice = unit(kind)?;
+        let lattice = Lattice::new(kind, 1.0)?;
         let name = title(kind);
         let mut printed: BTreeSet<LatticeIndex> = printed_delta(kind).into_iter().collect();
         printed.remove(&[0; 3]);
@@ -78,4 +78,13 @@ pub fn section(_: &Options, _: &mut dyn FnMut(f64)) -> Result<Section, AnyError>
         tables: vec![Table::new("deltas", "Neighbours: as printed and as computed from the lattice", columns, rows)],
         figures: Vec::new(),
     })
+}
+
+/// One of each pair of opposite differences, written "±(1,0,0)".
+fn pairs(differences: impl IntoIterator<Item = LatticeIndex>) -> String {
+    let half = differences.into_iter().filter(|w| *w > [0; 3]);
+    let mut half: Vec<LatticeIndex> = half.collect();
+    half.sort_unstable();
+    let words = half.iter().map(|[a, b, c]| format!("±({a},{b},{c})"));
+    words.collect::<Vec<_>>().join(" ")
 }

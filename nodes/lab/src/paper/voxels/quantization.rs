@@ -1,6 +1,6 @@
 //! Eq. (1) and (2): the share of points for which they miss the nearest lattice point.
 
-use super::{Options, unit};
+use super::report_options::Options;
 use crate::AnyError;
 use crate::evaluate::Share;
 use crate::paper::parallel::in_parallel;
@@ -41,7 +41,7 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
     let mut rows = Vec::new();
     let mut missed = None;
     for (number, (kind, rounding, with_zero)) in WRONG.into_iter().enumerate() {
-        let lattice = unit(kind)?;
+        let lattice = Lattice::new(kind, 1.0)?;
         let ways = ways(&lattice)?;
         let mut tell = |done| progress((number as f64 + done) / WRONG.len() as f64);
         let counts = in_parallel(blocks, &mut tell, |block| {

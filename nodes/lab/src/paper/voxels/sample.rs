@@ -1,6 +1,6 @@
 //! Evenly spread points of a cell.
 
-use super::Options;
+use super::report_options::Options;
 use crate::paper::streams::{Purpose, stream};
 use lattice_core::lattice::Lattice;
 use nalgebra::Vector3;

@@ -1,6 +1,6 @@
 //! Point clouds for the evaluation of quantization: uniform, simulated, or from files.
 
-use super::Options;
+use super::report_options::Options;
 use crate::paper::streams::{Purpose, stream};
 use crate::simulate::house::{House, LaserView};
 use crate::simulate::{RANGE_NOISE_M, Survey, SurveyPattern};

@@ -1,7 +1,7 @@
 //! Eq. (13) and the constants of the cells: exact figures and random points.
 
+use super::report_options::Options;
 use super::sample::Samples;
-use super::{Options, unit};
 use crate::AnyError;
 use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
@@ -59,10 +59,11 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
     let samples = Samples::new(options);
     let mut checks = Vec::new();
     let (mut exact_rows, mut random_rows) = (Vec::new(), Vec::new());
-    let [cubic_mse, cubic_mean, .., cubic_width, _] = figures(&unit(LatticeKind::Cubic)?);
+    let [cubic_mse, cubic_mean, .., cubic_width, _] =
+        figures(&Lattice::new(LatticeKind::Cubic, 1.0)?);
     let mut gains = Vec::new();
     for (number, (kind, known)) in KNOWN.into_iter().enumerate() {
-        let lattice = unit(kind)?;
+        let lattice = Lattice::new(kind, 1.0)?;
         let name = title(kind);
         let exact = figures(&lattice);
         let [mse, mean, rms, covering, packing, width, surface] = exact;

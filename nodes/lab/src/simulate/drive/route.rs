@@ -11,8 +11,8 @@ const SWAY_PER_S: [f64; 3] = [2.1, 1.7, 1.3];
 
 /// A way at constant speed after a start from rest.
 pub(super) struct Route {
-    pub form: Form,
-    pub speed_m_per_s: f64,
+    form: Form,
+    speed_m_per_s: f64,
     pub length_m: f64,
 }
 
@@ -25,6 +25,14 @@ pub(super) enum Form {
 }
 
 impl Route {
+    pub fn new(form: Form, speed_m_per_s: f64, length_m: f64) -> Route {
+        Route {
+            form,
+            speed_m_per_s,
+            length_m,
+        }
+    }
+
     /// Length of one round.
     pub fn round_m(half_m: [f64; 2], corner_m: f64) -> f64 {
         let straight = 4.0 * (half_m[0] + half_m[1] - 2.0 * corner_m);

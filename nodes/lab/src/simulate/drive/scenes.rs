@@ -3,9 +3,62 @@
 use nalgebra::{Point3, Vector3};
 
 use super::route::{Form as Way, Route};
-use super::{Drive, DriveScene, Moving, SpinningLidar};
+use super::scans::{Drive, Moving, SpinningLidar};
 use crate::random::Stream;
 use crate::simulate::town::solid::{Form, Solid};
+
+/// Scene of a drive.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum DriveScene {
+    /// A circuit of streets with parked and moving cars.
+    Town,
+    /// A circuit through a hall with partitions and furniture.
+    Indoor,
+    /// A corridor with doors and closed ends.
+    Corridor,
+    /// A street, a tunnel without features, and a street.
+    Tunnel,
+    /// An empty plane.
+    Yard,
+    /// The indoor circuit, with scans without returns for a while.
+    Blank,
+    /// The indoor circuit, without scans for two seconds.
+    Gap,
+    /// The circuit of streets, and half of it again.
+    TownAgain,
+    /// The indoor circuit, and half of it again.
+    IndoorAgain,
+}
+
+impl DriveScene {
+    /// All scenes.
+    pub const ALL: [DriveScene; 9] = [
+        DriveScene::Town,
+        DriveScene::Indoor,
+        DriveScene::Corridor,
+        DriveScene::Tunnel,
+        DriveScene::Yard,
+        DriveScene::Blank,
+        DriveScene::Gap,
+        DriveScene::TownAgain,
+        DriveScene::IndoorAgain,
+    ];
+
+    /// Name of the scene.
+    pub fn name(self) -> &'static str {
+        match self {
+            DriveScene::Town => "town",
+            DriveScene::Indoor => "indoor",
+            DriveScene::Corridor => "corridor",
+            DriveScene::Tunnel => "tunnel",
+            DriveScene::Yard => "yard",
+            DriveScene::Blank => "blank",
+            DriveScene::Gap => "gap",
+            DriveScene::TownAgain => "town_again",
+            DriveScene::IndoorAgain => "indoor_again",
+        }
+    }
+}
 
 /// Class of all solids: odometry has no classes.
 const LABEL: u16 = 0;
@@ -30,7 +83,20 @@ const ROBOT: SpinningLidar = SpinningLidar {
     height_m: 1.0,
 };
 
-pub(super) fn drive(scene: DriveScene, seed: u64) -> Drive {
+impl Drive {
+    /// Creates the drive of a scene and a seed.
+    pub fn new(scene: DriveScene, seed: u64) -> Drive {
+        drive(scene, seed)
+    }
+
+    /// Creates the drive through the town with persons who walk by, and the same drive without anything that moves:
+    /// what both hit has the same points.
+    pub fn passers(seed: u64) -> [Drive; 2] {
+        passers(seed)
+    }
+}
+
+fn drive(scene: DriveScene, seed: u64) -> Drive {
     let random = &mut Stream::numbered(seed, 3);
     let mut drive = match scene {
         DriveScene::Town | DriveScene::TownAgain => town(random),
@@ -180,13 +246,9 @@ fn town(random: &mut Stream) -> Drive {
         car(-350.0 + place(60.0), half_m[1] - 3.2, 9.0),
         car(300.0 + place(60.0), half_m[1], -7.5),
     ];
-    let way = Way::Around { half_m, corner_m };
+    let form = Way::Around { half_m, corner_m };
     let length_m = Route::round_m(half_m, corner_m);
-    let route = Route {
-        form: way,
-        speed_m_per_s: 8.0,
-        length_m,
-    };
+    let route = Route::new(form, 8.0, length_m);
     Drive {
         moving,
         ..still(ROOF, solids, route)
@@ -194,7 +256,7 @@ fn town(random: &mut Stream) -> Drive {
 }
 
 /// The town with three persons, and without them and the moving cars.
-pub(super) fn passers(seed: u64) -> [Drive; 2] {
+fn passers(seed: u64) -> [Drive; 2] {
     let still = || Drive {
         moving: Vec::new(),
         ..drive(DriveScene::Town, seed)
@@ -249,11 +311,7 @@ fn indoor(random: &mut Stream) -> Drive {
     }
     let length_m = Route::round_m(half_m, corner_m);
     let form = Way::Around { half_m, corner_m };
-    let route = Route {
-        form,
-        speed_m_per_s: 1.3,
-        length_m,
-    };
+    let route = Route::new(form, 1.3, length_m);
     still(ROBOT, solids, route)
 }
 
@@ -288,11 +346,7 @@ fn corridor(random: &mut Stream) -> Drive {
         }
     }
     let form = Way::Straight { from: [0.0, 0.1] };
-    let route = Route {
-        form,
-        speed_m_per_s: 1.2,
-        length_m,
-    };
+    let route = Route::new(form, 1.2, length_m);
     still(ROBOT, solids, route)
 }
 
@@ -316,21 +370,13 @@ fn tunnel(random: &mut Stream) -> Drive {
         }
     }
     let form = Way::Straight { from: [0.0, -1.5] };
-    let route = Route {
-        form,
-        speed_m_per_s: 12.0,
-        length_m: 400.0,
-    };
+    let route = Route::new(form, 12.0, 400.0);
     still(ROOF, solids, route)
 }
 
 fn yard() -> Drive {
     let (half_m, corner_m) = ([20.0, 15.0], 6.0);
     let form = Way::Around { half_m, corner_m };
-    let route = Route {
-        form,
-        speed_m_per_s: 4.0,
-        length_m: 80.0,
-    };
+    let route = Route::new(form, 4.0, 80.0);
     still(ROOF, Vec::new(), route)
 }

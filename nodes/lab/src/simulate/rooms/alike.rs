@@ -3,7 +3,7 @@
 use lattice_core::registration::{LabelDistribution, SemanticCloud, SourceCloud};
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::{FLOOR, Flat, WALL};
+use super::flat::{FLOOR, Flat, WALL};
 
 const HEIGHT_M: f64 = 2.7;
 const EYE_M: f64 = 1.6;

@@ -1,7 +1,8 @@
 //! Eqs. (1) to (4): ICP and GICP-SE(3).
 
 use super::literal::{self, Pair};
-use super::{Bench, GATE_M, Slip, slips};
+use super::reference_scene::{GATE_M, ReferenceScene};
+use super::slips::{Slip, slips};
 use crate::AnyError;
 use crate::evaluate::median;
 use crate::report::plot::{Area, Curve, Layout, curves, svg};
@@ -69,10 +70,10 @@ impl Line {
 }
 
 /// Lines along the line of sight, across it and about the vertical.
-pub(super) fn lines(bench: &Bench, cost: impl Fn(&Isometry3<f64>) -> f64) -> Vec<Line> {
-    let truth = &bench.scenario.truth;
-    let seen_m = truth * bench.scenario.pivot_m;
-    let scan = bench.scenario.headset_scans.first();
+pub(super) fn lines(scene: &ReferenceScene, cost: impl Fn(&Isometry3<f64>) -> f64) -> Vec<Line> {
+    let truth = &scene.scenario.truth;
+    let seen_m = truth * scene.scenario.pivot_m;
+    let scan = scene.scenario.headset_scans.first();
     let eye_m = scan.and_then(|scan| scan.sensor_m);
     let sight = seen_m - truth * eye_m.unwrap_or(Point3::origin());
     let level = Vector3::new(sight.x, sight.y, 0.0);
@@ -86,8 +87,8 @@ pub(super) fn lines(bench: &Bench, cost: impl Fn(&Isometry3<f64>) -> f64) -> Vec
             points: places.map(|at| (at, cost(&pose(at * reach)))).collect(),
         }
     };
-    let moved = |axis: Vector3<f64>| move |m| bench.off(axis * m, 0.0);
-    let turned = |rad| bench.off(Vector3::zeros(), rad);
+    let moved = |axis: Vector3<f64>| move |m| scene.off(axis * m, 0.0);
+    let turned = |rad| scene.off(Vector3::zeros(), rad);
     vec![
         line("along the line of sight (m)", REACH_M, &moved(along)),
         line("across it (m)", REACH_M, &moved(across)),
@@ -141,14 +142,14 @@ pub(super) fn figure(
     Ok(Figure::new(name, caption, svg(&layout, draw)?))
 }
 
-pub(super) fn section(bench: &Bench) -> Result<Section, AnyError> {
-    let (source, target) = (bench.source(), bench.target());
-    let truth = bench.scenario.truth;
-    let start = bench.start();
+pub(super) fn section(scene: &ReferenceScene) -> Result<Section, AnyError> {
+    let (source, target) = (scene.source(), scene.target());
+    let truth = scene.scenario.truth;
+    let start = scene.start();
     let options = RegisterOptions::gicp_se3();
     let pairs = literal::nearest(source, target, &truth, 1, GATE_M);
     let far = literal::nearest(source, target, &start, 1, GATE_M);
-    let lines = lines(bench, |pose| literal::gicp(&pairs, pose));
+    let lines = lines(scene, |pose| literal::gicp(&pairs, pose));
 
     let step = RegisterOptions {
         max_iterations: 1,
@@ -164,7 +165,7 @@ pub(super) fn section(bench: &Bench) -> Result<Section, AnyError> {
         [(&far, &start), (&end, &whole)].map(|(pairs, pose)| literal::gradient(pairs, pose).norm());
 
     let mut checks = vec![
-        known_motion(bench)?,
+        known_motion(scene)?,
         relative(
             "f_GICP of the library and eq. (3) written out, at the truth",
             literal::of_library(source, target, &truth, &options),
@@ -182,7 +183,7 @@ pub(super) fn section(bench: &Bench) -> Result<Section, AnyError> {
     let what = "gradient where argmin ends, as a share of that at the start";
     checks.push(Check::new(what, 0.0, after / before, 0.01));
     checks.extend(ends("f_GICP", &lines));
-    let [forth, back] = directions(bench);
+    let [forth, back] = directions(scene);
     Ok(Section {
         id: "eq1-4".to_owned(),
         title: "Eqs. (1) to (4): ICP and GICP-SE(3)".to_owned(),
@@ -195,9 +196,9 @@ pub(super) fn section(bench: &Bench) -> Result<Section, AnyError> {
              argmin makes that {:.2} m, all steps {:.3} m. What the library minimises is eq. (3) digit for digit. Eq. (1) in the \
              printed direction pairs each voxel of the map with the view, {back:.2} m away in the median even at the true pose; the other way \
              it is {forth:.3} m.",
-            bench.seen_m(&start),
-            bench.seen_m(&once),
-            bench.seen_m(&whole),
+            scene.seen_m(&start),
+            scene.seen_m(&once),
+            scene.seen_m(&whole),
         ),
         verdict: Verdict::Corrected(
             "with argmin for argmax in eq. (3), and pairs from the headset to the map".to_owned(),
@@ -228,9 +229,9 @@ pub(super) fn slope_check(pairs: &[Pair], pose: &Isometry3<f64>) -> Check {
 }
 
 /// Eq. (2): a cloud and itself, moved.
-fn known_motion(bench: &Bench) -> Result<Check, AnyError> {
+fn known_motion(scene: &ReferenceScene) -> Result<Check, AnyError> {
     let known = Isometry3::new(Vector3::new(0.004, -0.003, 0.002), Vector3::z() * 0.002);
-    let points_m = bench.source().points_m();
+    let points_m = scene.source().points_m();
     let moved = points_m.iter().map(|p| known * p).collect();
     let moved = PreparedCloud::new(SemanticCloud::unlabelled(moved), &PrepareOptions::default())?;
     let options = RegisterOptions {
@@ -238,7 +239,7 @@ fn known_motion(bench: &Bench) -> Result<Check, AnyError> {
         rotation_tolerance_rad: 1e-9,
         ..RegisterOptions::point_to_point(1.0)
     };
-    let found = register(bench.source(), &moved, &Isometry3::identity(), &options);
+    let found = register(scene.source(), &moved, &Isometry3::identity(), &options);
     let found = found.target_from_source;
     let points = points_m.iter();
     let apart = points.map(|p| nalgebra::distance(&(found * p), &(known * p)));
@@ -248,8 +249,8 @@ fn known_motion(bench: &Bench) -> Result<Check, AnyError> {
 }
 
 /// Median distances (m) of the nearest points at the truth: from headset to map, and from map to headset.
-fn directions(bench: &Bench) -> [f64; 2] {
-    let truth = bench.scenario.truth;
+fn directions(scene: &ReferenceScene) -> [f64; 2] {
+    let truth = scene.scenario.truth;
     let back = truth.inverse();
     let medians = |from: &PreparedCloud, to: &PreparedCloud, pose: &Isometry3<f64>| {
         let points_m = from.points_m().iter();
@@ -257,7 +258,7 @@ fn directions(bench: &Bench) -> [f64; 2] {
         median(nearest.map(|(_, squared)| squared.sqrt())).unwrap_or(f64::NAN)
     };
     [
-        medians(bench.source(), bench.target(), &truth),
-        medians(bench.target(), bench.source(), &back),
+        medians(scene.source(), scene.target(), &truth),
+        medians(scene.target(), scene.source(), &back),
     ]
 }

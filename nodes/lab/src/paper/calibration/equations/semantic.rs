@@ -2,10 +2,12 @@
 
 use super::geometry::{ends, figure, lines, relative, slope_check};
 use super::literal::{self, ALPHA, rho, rho_slope};
-use super::{Bench, Context, GATE_M, Slip, slips};
+use super::reference_scene::{GATE_M, ReferenceScene};
+use super::slips::{Slip, slips};
 use crate::AnyError;
 use crate::evaluate::{Bounds, WRONG, median};
 use crate::metrics::PoseError;
+use crate::paper::calibration::context::Context;
 use crate::report::plot::{Area, Curve, Layout, curves, svg};
 use crate::report::{Cell, Check, Figure, Section, Table, Verdict};
 use crate::simulate::house::Scene;
@@ -51,17 +53,17 @@ const MOST: usize = lattice_core::registration::MAX_CANDIDATES;
 /// Trials of each scene in the comparison of readings.
 const SEEDS: u64 = 4;
 
-pub(super) fn section(context: &Context, bench: &Bench) -> Result<Section, AnyError> {
-    let (source, target) = (bench.source(), bench.target());
-    let truth = bench.scenario.truth;
-    let start = bench.start();
+pub(super) fn section(context: &Context, scene: &ReferenceScene) -> Result<Section, AnyError> {
+    let (source, target) = (scene.source(), scene.target());
+    let truth = scene.scenario.truth;
+    let start = scene.start();
     let options = |variant| RegisterOptions::semantic(variant, LabelUse::Hard);
     let published = options(SemanticVariant::Published);
     let printed = options(SemanticVariant::AsPrinted);
     let pairs = literal::nearest(source, target, &truth, published.neighbors, GATE_M);
     let far = literal::nearest(source, target, &start, published.neighbors, GATE_M);
-    let outside = lines(bench, |pose| literal::outside(&pairs, pose));
-    let inside = lines(bench, |pose| literal::inside(&pairs, &truth, pose));
+    let outside = lines(scene, |pose| literal::outside(&pairs, pose));
+    let inside = lines(scene, |pose| literal::inside(&pairs, &truth, pose));
 
     let mut checks = vec![
         relative(
@@ -233,18 +235,18 @@ fn readings(context: &Context) -> Result<(Table, usize), AnyError> {
             let seed = context.first_seed.wrapping_add(seed);
             let view = context.testbed.view(scene, seed)?;
             let scenario = context.testbed.scenario(&view, 0.0)?;
-            let bench = Bench { scenario };
+            let scene = ReferenceScene { scenario };
             count += 1;
             let heading = 2.4 * (count as f64);
             for ((_, options), errors) in readings.iter().zip(&mut errors) {
                 for ((m, deg), errors) in starts.iter().zip(errors) {
                     let moved = Vector3::new(heading.cos(), heading.sin(), 0.0) * *m;
                     let side = if count % 2 == 0 { 1.0_f64 } else { -1.0 };
-                    let start = bench.off(moved, side * f64::to_radians(*deg));
-                    let found = register(bench.source(), bench.target(), &start, options);
+                    let start = scene.off(moved, side * f64::to_radians(*deg));
+                    let found = register(scene.source(), scene.target(), &start, options);
                     let pose = found.target_from_source;
-                    let error = PoseError::between(&pose, &bench.scenario.truth);
-                    errors.push((error, bench.seen_m(&pose)));
+                    let error = PoseError::between(&pose, &scene.scenario.truth);
+                    errors.push((error, scene.seen_m(&pose)));
                 }
             }
         }

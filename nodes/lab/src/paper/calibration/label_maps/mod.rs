@@ -3,7 +3,7 @@
 mod picture;
 mod sheet;
 
-use super::Context;
+use super::context::Context;
 use crate::AnyError;
 use crate::evaluate::Scenario;
 use crate::render::LabelColors;

@@ -1,6 +1,8 @@
 //! The conclusion of the paper: labels help where they agree, and harm where they do not.
 
-use super::{GICP, SEMANTIC, Trials, figures, in_words, methods, right};
+use super::figures;
+use super::methods::{GICP, SEMANTIC, methods};
+use super::trials_of_methods::{Trials, in_words, right};
 use crate::AnyError;
 use crate::evaluate::{OURS, title};
 use crate::report::{Cell, Section, Table, Verdict};

@@ -1,7 +1,9 @@
 //! Every trial beside the printed errors, and medians by the share of wrong labels.
 
-use super::table1::{blamed, printed};
-use super::{GICP, Median, SEMANTIC, Trials, in_words, methods};
+use super::median::Median;
+use super::methods::{GICP, SEMANTIC, methods};
+use super::printed::{blamed, printed};
+use super::trials_of_methods::{Trials, in_words};
 use crate::AnyError;
 use crate::evaluate::{OURS, color, letters, title};
 use crate::report::Figure;

@@ -1,20 +1,13 @@
 //! Table 1: eight errors of one run each, beside the errors of many.
 
-use super::{GICP, SEMANTIC, Trials, figures, in_words, methods, right};
+use super::figures;
+use super::methods::{GICP, SEMANTIC, methods};
+use super::printed::{blamed, printed};
+use super::trials_of_methods::{Trials, in_words, right};
 use crate::AnyError;
-use crate::evaluate::{PRINTED, Printed, Share, title};
+use crate::evaluate::{Share, title};
 use crate::report::{Cell, Section, Table, Verdict};
 use crate::simulate::house::Scene;
-
-/// Printed errors of a scene.
-pub(super) fn printed(scene: Scene) -> Option<&'static Printed> {
-    PRINTED.iter().find(|printed| printed.scene == scene.name())
-}
-
-/// True of a scene whose labels the paper finds wrong (section 5, Figs. 3 and 4).
-pub(super) fn blamed(scene: Scene) -> bool {
-    matches!(scene, Scene::Tv | Scene::Bookshelf)
-}
 
 pub(super) fn section(trials: &Trials) -> Result<Section, AnyError> {
     let [good, poor] = &trials.starts;

@@ -1,7 +1,8 @@
 //! Verdicts on made-up trials.
 
+use super::methods::{SEMANTIC, methods};
 use super::*;
-use crate::evaluate::Cell;
+use crate::evaluate::{Cell, OURS, Trial};
 use crate::report::Verdict;
 use crate::simulate::house::Scene;
 use nalgebra::Isometry3;

@@ -1,6 +1,6 @@
 //! Table I as a picture.
 
-use super::{Placed, Printed, find, rms_m};
+use super::placed::{Placed, Printed, find, rms_m};
 use crate::AnyError;
 use crate::evaluate::extent;
 use crate::report::plot::{Area, BoxStats, Layout, NamedBox, boxes, color, svg};

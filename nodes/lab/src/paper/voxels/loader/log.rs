@@ -1,6 +1,6 @@
 //! The logs that Table I is made of.
 
-use super::{POINTS, VOLUME_M3};
+use super::placed::{POINTS, VOLUME_M3};
 use crate::simulate::{Survey, SurveyPattern};
 use crate::{AnyError, at};
 use lattice_bag::BagReader;

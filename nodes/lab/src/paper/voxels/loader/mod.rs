@@ -2,10 +2,11 @@
 
 mod figure;
 mod log;
+mod placed;
 mod tables;
 
-use super::Options;
-use super::rotations::{Quantized, quantized};
+use super::report_options::Options;
+use super::rotations::quantized;
 use crate::AnyError;
 use crate::evaluate::extent;
 use crate::paper::estimate::Estimate;
@@ -13,80 +14,18 @@ use crate::paper::parallel::in_parallel;
 use crate::paper::streams::{Purpose, stream};
 use crate::report::plot::title;
 use crate::report::{Check, Figure, Section, Verdict};
-use crate::theory::{mean_distance_m, second_moment};
+use crate::theory::mean_distance_m;
 use figure::draw;
 use lattice_core::lattice::{Lattice, LatticeKind};
 use log::{SPAN_S, replayed, simulated_log};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use placed::{POINTS, Placed, TABLE, VOLUME_M3, find, printed, rms_m};
 use tables::{compared, of_log, theory};
 
-/// Points of the log, and the volume of a cell, as in the paper.
-const POINTS: usize = 19_399;
-const VOLUME_M3: f64 = 0.125;
 /// Allowed error of a mean over all places of the lattice, as a share of theory: full and quick.
 const TOLERANCES: [f64; 2] = [0.002, 0.01];
 /// Half of the last printed digit.
 const DIGIT: f64 = 0.5e-4;
-
-/// A row of Table I.
-#[derive(Clone, Copy)]
-struct Printed {
-    voxels: f64,
-    mse: f64,
-    distance_error: f64,
-}
-
-fn printed(kind: LatticeKind) -> Option<Printed> {
-    let row = TABLE.iter().find(|row| row.0 == kind);
-    row.map(|&(_, [voxels, mse, distance_error])| Printed {
-        voxels,
-        mse,
-        distance_error,
-    })
-}
-
-/// Table I in its order: voxels, mean squared error by dimension, "distance error".
-const TABLE: [(LatticeKind, [f64; 3]); 5] = [
-    (LatticeKind::Cubic, [3139.0, 0.0226, 0.2606]),
-    (LatticeKind::Fcc, [3197.0, 0.0197, 0.2432]),
-    (LatticeKind::Bcc, [3150.0, 0.0195, 0.2421]),
-    (LatticeKind::Mcc, [3078.0, 0.0186, 0.2365]),
-    (LatticeKind::Hex, [2904.0, 0.0218, 0.2560]),
-];
-
-/// The points of the simulated log in one lattice, at places of the lattice spread over its cell.
-struct Placed {
-    lattice: Lattice,
-    places: Vec<Quantized>,
-    printed: Option<Printed>,
-}
-
-impl Placed {
-    fn each(&self, of: impl Fn(&Quantized) -> f64) -> Vec<f64> {
-        self.places.iter().map(of).collect()
-    }
-
-    fn mean(&self, of: impl Fn(&Quantized) -> f64) -> Estimate {
-        Estimate::of(self.each(of))
-    }
-
-    fn voxels(&self) -> Estimate {
-        self.mean(|q| q.voxels as f64)
-    }
-
-    fn name(&self) -> &'static str {
-        title(self.lattice.kind())
-    }
-
-    /// Mean squared error by dimension of evenly spread points, m^2.
-    fn mse_of_theory(&self) -> f64 {
-        second_moment(&self.lattice) * self.lattice.cell_side_m().powi(2)
-    }
-}
-
-fn rms_m(q: &Quantized) -> f64 {
-    (3.0 * q.mse_m2).sqrt()
-}
 
 pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let bags = options.bags.len() as f64;
@@ -192,10 +131,6 @@ fn checks(all: &[Placed], tolerance: f64) -> Vec<Check> {
     checks
 }
 
-fn find(all: &[Placed], kind: LatticeKind) -> Option<&Placed> {
-    all.iter().find(|placed| placed.lattice.kind() == kind)
-}
-
 fn finding(all: &[Placed]) -> String {
     let cubic = find(all, LatticeKind::Cubic);
     let cubic_voxels = cubic.map_or(f64::NAN, |placed| placed.voxels().mean);
@@ -247,6 +182,7 @@ fn finding(all: &[Placed]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::theory::second_moment;
 
     #[test]
     fn over_all_places_a_point_is_anywhere_in_its_cell() {

@@ -1,6 +1,6 @@
 //! The tables beside Table I.
 
-use super::{POINTS, Placed, Printed, VOLUME_M3, find, rms_m};
+use super::placed::{POINTS, Placed, Printed, VOLUME_M3, find, rms_m};
 use crate::evaluate::extent;
 use crate::report::plot::title;
 use crate::report::{Cell, Table};

@@ -1,7 +1,7 @@
 //! The pictures of Fig. 6.
 
-use super::Played;
 use super::compare::{Estimate, change};
+use super::group::Played;
 use crate::AnyError;
 use crate::report::plot::{Area, BoxStats, Layout, NamedBox, boxes, chart, color, svg, title};
 use lattice_core::lattice::LatticeKind;

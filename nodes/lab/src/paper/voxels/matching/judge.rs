@@ -1,6 +1,6 @@
 //! The verdict of the trials on the claim.
 
-use super::{BCC, BEST_HEX, FCC, Group, HEX, MCC, SHARE_NAMES, name};
+use super::group::{BCC, BEST_HEX, FCC, Group, HEX, MCC, SHARE_NAMES, name};
 use crate::report::{Check, Verdict};
 
 /// Change of median and 95th percentile against cubic, %, in simulated rooms of another program with the
@@ -117,7 +117,7 @@ pub(super) fn checks(rooms: &Group) -> Vec<Check> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Estimate;
+    use super::super::compare::Estimate;
     use super::super::scenes::{OFFICE, ROOMS, STREET};
     use super::*;
 

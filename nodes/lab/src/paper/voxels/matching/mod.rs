@@ -2,39 +2,25 @@
 
 mod compare;
 mod draw;
+mod group;
 mod judge;
 mod scenes;
 mod trials;
 
-use super::Options;
+use super::report_options::Options;
 use crate::AnyError;
 use crate::report::plot::title;
 use crate::report::{Cell, Figure, Section, Table};
-use compare::{Estimate, Quantiles, SHARES, change};
+use compare::{Estimate, Quantiles, SHARES};
+use group::{Group, Played};
 use judge::{ELSEWHERE, checks, finding, verdict};
 use lattice_core::lattice::LatticeKind;
-use scenes::{Scene, Source, scenes};
-use trials::Trials;
+use scenes::{Source, scenes};
 
 /// Trials of a scene, and of a quick run.
 const TRIALS: (usize, usize) = (600, 24);
 /// Resamples of the trials, and of a quick run.
 const RESAMPLES: (usize, usize) = (2000, 400);
-/// Names of [`SHARES`].
-const SHARE_NAMES: [&str; 2] = ["median", "95th percentile"];
-/// Places in [`LatticeKind::ALL`].
-const BCC: usize = 1;
-const FCC: usize = 2;
-const MCC: usize = 3;
-const HEX: usize = 4;
-const BEST_HEX: usize = 5;
-
-/// A scene with its trials.
-struct Played {
-    scene: Scene,
-    trials: Trials,
-    quantiles: Quantiles,
-}
 
 pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let pick = |(full, quick): (usize, usize)| if options.quick { quick } else { full };
@@ -84,64 +70,6 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
                           median. Hollow: 95th percentile. Below 0 is better than cubic. A bar that reaches the border goes on.", draw::changes_of(&played)?),
         ],
     })
-}
-
-/// Scenes taken together: change against cubic of [`SHARES`] by lattice, and of the poses tried, %.
-#[derive(Clone)]
-struct Group {
-    change: [[Estimate; 6]; 2],
-    evaluations: [f64; 6],
-}
-
-impl Group {
-    fn of(members: &[&Played]) -> Option<Group> {
-        let quantiles: Vec<&Quantiles> = members.iter().map(|p| &p.quantiles).collect();
-        let lattices = [0, 1, 2, 3, 4, 5];
-        let evaluations = |lattice: usize| {
-            let ratio = |p: &&Played| p.trials.evaluations(lattice) / p.trials.evaluations(0);
-            let sum: f64 = members.iter().map(ratio).sum();
-            100.0 * (sum / members.len() as f64 - 1.0)
-        };
-        (!members.is_empty()).then(|| Group {
-            change: [0, 1].map(|share| lattices.map(|l| change(&quantiles, share, l))),
-            evaluations: lattices.map(evaluations),
-        })
-    }
-
-    /// "median -5.1 % (-9.0 to -1.2), 95th percentile ...".
-    fn words(&self, lattice: usize) -> String {
-        let one = |(name, of): (&str, &[Estimate; 6])| {
-            let Estimate { value, low, high } = of[lattice];
-            format!("{name} {value:+.1} % ({low:+.1} to {high:+.1})")
-        };
-        let shares = SHARE_NAMES.into_iter().zip(&self.change);
-        shares.map(one).collect::<Vec<_>>().join(", ")
-    }
-
-    /// True if both shares are below cubic, and true if one of them is so with all of its interval.
-    fn better(&self, lattice: usize) -> (bool, bool) {
-        let below = self.change.iter().all(|of| of[lattice].value < 0.0);
-        let surely = self.change.iter().any(|of| of[lattice].high < 0.0);
-        (below, below && surely)
-    }
-
-    /// True if no interval of a lattice leaves out 0.
-    fn as_cubic(&self, lattice: usize) -> bool {
-        let both = |e: &Estimate| e.low <= 0.0 && e.high >= 0.0;
-        self.change.iter().all(|of| both(&of[lattice]))
-    }
-
-    /// True if a lattice has no larger error than FCC in either share.
-    fn at_least_fcc(&self, lattice: usize) -> bool {
-        let no_worse = |of: &[Estimate; 6]| of[lattice].value <= of[FCC].value;
-        self.change.iter().all(no_worse)
-    }
-}
-
-/// A lattice's name, by its place.
-fn name(lattice: usize) -> &'static str {
-    let kind = LatticeKind::ALL.get(lattice);
-    kind.map_or("", |kind| title(*kind))
 }
 
 fn between(low: f64, high: f64, digits: usize) -> Cell {

@@ -2,7 +2,7 @@
 
 mod spread;
 
-use super::Options;
+use super::report_options::Options;
 use super::sample::Samples;
 use crate::AnyError;
 use crate::report::plot::{Layout, curves, key, svg, title};

@@ -4,7 +4,6 @@ use crate::AnyError;
 use crate::paper::estimate::Estimate;
 use crate::paper::parallel::in_parallel;
 use crate::paper::voxels::sample::Samples;
-use crate::paper::voxels::unit;
 use crate::paper_values::printed_delta;
 use crate::report::plot::{Curve, color, title};
 use crate::report::{Cell, numbers};
@@ -70,7 +69,7 @@ impl Spread {
         seed: u64,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Spread, AnyError> {
-        let lattice = unit(kind)?;
+        let lattice = Lattice::new(kind, 1.0)?;
         let set = cells.of(&lattice);
         let centers: Vec<_> = set.iter().map(|&w| lattice.center(w)).collect();
         let draws = in_parallel(samples.draws, progress, |draw| {

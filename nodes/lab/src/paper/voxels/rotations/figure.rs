@@ -1,6 +1,6 @@
 //! Fig. 5 itself.
 
-use super::Run;
+use super::turned_cloud::TurnedCloud;
 use crate::AnyError;
 use crate::evaluate::extent;
 use crate::paper::voxels::scan::Scan;
@@ -9,7 +9,7 @@ use crate::report::plot::{Curve, Layout, color, cumulative, curves, key, svg};
 use lattice_core::lattice::LatticeKind;
 
 /// Cumulative distributions of a cloud: a row for each kind of turns.
-pub fn figure(scan: &Scan, runs: &[&Run]) -> Result<Figure, AnyError> {
+pub fn figure(scan: &Scan, runs: &[&TurnedCloud]) -> Result<Figure, AnyError> {
     let key = key(&LatticeKind::ALL);
     let layout = Layout::new((500, 310), [2, runs.len()], 130, &key);
     let picture = svg(&layout, |areas| {

@@ -94,6 +94,11 @@ impl Measured {
         changes(&self.means_m, &other.means_m)
     }
 
+    /// Standard deviation of the count.
+    pub fn spread(&self) -> Estimate {
+        Estimate::deviation_of(&self.counts)
+    }
+
     /// Poses at which another lattice takes fewer voxels.
     pub fn more_than(&self, other: &Measured) -> impl Iterator<Item = bool> {
         let pairs = self.counts.iter().zip(&other.counts);

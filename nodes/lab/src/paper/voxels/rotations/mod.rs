@@ -3,63 +3,27 @@
 mod figure;
 mod measure;
 mod tables;
+mod turned_cloud;
 
+use super::report_options::Options;
 use super::scan::{Scan, Source, scans};
-use super::{Options, unit};
 use crate::AnyError;
 use crate::evaluate::extent;
-use crate::paper::estimate::Estimate;
 use crate::report::plot::title;
 use crate::report::{Check, Section, Verdict};
 use crate::theory::mean_distance_m;
 use figure::figure;
-use lattice_core::lattice::LatticeKind;
-use measure::{Laid, Measured, Turns, measure};
+use lattice_core::lattice::{Lattice, LatticeKind};
+use measure::{Laid, Turns, measure};
 pub use measure::{Quantized, quantized};
 use tables::{details, summary};
+use turned_cloud::{ROUND, TurnedCloud};
 
-/// The lattices that are rounder than cubes.
-const ROUND: [LatticeKind; 3] = [LatticeKind::Bcc, LatticeKind::Fcc, LatticeKind::Mcc];
 /// Allowed error of a mean distance of evenly spread points, as a share of it.
 const TOLERANCE: f64 = 0.002;
 /// Allowed error of a count of evenly spread points, as a share of it: the surface of their cube cuts a
 /// different number of cells.
 const COUNT_TOLERANCE: f64 = 0.005;
-
-/// A cloud in cells of a size under turns of a kind.
-struct Run<'a> {
-    scan: &'a Scan,
-    volume_m3: f64,
-    turns: Turns,
-    measured: Vec<Measured>,
-}
-
-impl Run<'_> {
-    fn of(&self, laid: Laid) -> Option<&Measured> {
-        self.measured.iter().find(|measured| measured.laid == laid)
-    }
-
-    fn paper(&self, kind: LatticeKind) -> Option<&Measured> {
-        self.of(Laid::paper(kind))
-    }
-
-    fn cubic(&self) -> Option<&Measured> {
-        self.paper(LatticeKind::Cubic)
-    }
-
-    fn count_change(&self, kind: LatticeKind) -> Option<Estimate> {
-        Some(self.paper(kind)?.count_to(self.cubic()?))
-    }
-
-    fn is_drawn(&self) -> bool {
-        self.scan.volumes_m3.first() == Some(&self.volume_m3)
-    }
-
-    fn name(&self) -> String {
-        let Run { scan, turns, .. } = self;
-        format!("{}, {} m³, {}", scan.title, self.volume_m3, turns.name())
-    }
-}
 
 pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Section, AnyError> {
     let scans = scans(options)?;
@@ -79,7 +43,7 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
         }
         let mut tell = |done| progress((number as f64 + done) / tasks.len() as f64);
         let how = (turns, poses, options.seed);
-        runs.push(Run {
+        runs.push(TurnedCloud {
             scan,
             volume_m3,
             turns,
@@ -103,7 +67,7 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
     };
     let steadiness = |kind| {
         let [low, high] = over_scans(&runs, Turns::Any, |run| {
-            Some(spread(run.paper(kind)?).mean / spread(run.cubic()?).mean)
+            Some(run.paper(kind)?.spread().mean / run.cubic()?.spread().mean)
         });
         format!("{low:.2} to {high:.2}")
     };
@@ -146,25 +110,29 @@ pub fn section(options: &Options, progress: &mut dyn FnMut(f64)) -> Result<Secti
 }
 
 /// Least and greatest value of the scans in their first cells.
-fn over_scans(runs: &[Run], turns: Turns, value: impl Fn(&Run) -> Option<f64>) -> [f64; 2] {
-    let shown = |run: &&Run| run.turns == turns && run.is_drawn();
+fn over_scans(
+    runs: &[TurnedCloud],
+    turns: Turns,
+    value: impl Fn(&TurnedCloud) -> Option<f64>,
+) -> [f64; 2] {
+    let shown = |run: &&TurnedCloud| run.turns == turns && run.is_drawn();
     let scans = runs.iter().filter(shown);
     let scans = scans.filter(|run| run.scan.source != Source::Uniform);
     extent(scans.filter_map(value))
 }
 
 /// Checks of a run against theory and the paper.
-fn check(run: &Run) -> Result<Vec<Check>, AnyError> {
+fn check(run: &TurnedCloud) -> Result<Vec<Check>, AnyError> {
     let mut checks = Vec::new();
     let name = run.name();
     let Some(cubic) = run.cubic() else {
         return Ok(checks);
     };
     if run.scan.source == Source::Uniform {
-        let cube = mean_distance_m(&unit(LatticeKind::Cubic)?, [0; 3]);
+        let cube = mean_distance_m(&Lattice::new(LatticeKind::Cubic, 1.0)?, [0; 3]);
         for measured in &run.measured {
             let kind = measured.laid.kind;
-            let of_theory = mean_distance_m(&unit(kind)?, [0; 3]) / cube - 1.0;
+            let of_theory = mean_distance_m(&Lattice::new(kind, 1.0)?, [0; 3]) / cube - 1.0;
             let what = format!("{name}: mean distance of {} to cubic (%)", title(kind));
             let found = 100.0 * measured.mean_to(cubic).mean;
             checks.push(Check::new(
@@ -198,7 +166,7 @@ fn check(run: &Run) -> Result<Vec<Check>, AnyError> {
                 continue;
             }
             that("takes fewer voxels than cubic", count.is_negative());
-            let steadiness = spread(measured).over(&spread(cubic));
+            let steadiness = measured.spread().over(&cubic.spread());
             let steadier = steadiness.mean + steadiness.half < 1.0;
             that("takes a steadier number than cubic", steadier);
             if let Some(hex) = run.paper(LatticeKind::Hex) {
@@ -225,9 +193,4 @@ fn check(run: &Run) -> Result<Vec<Check>, AnyError> {
         }
     }
     Ok(checks)
-}
-
-/// Standard deviation of the count.
-fn spread(measured: &Measured) -> Estimate {
-    Estimate::deviation_of(&measured.counts)
 }

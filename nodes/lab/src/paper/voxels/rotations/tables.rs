@@ -1,7 +1,7 @@
 //! The numbers of Fig. 5.
 
 use super::measure::Laid;
-use super::{ROUND, Run, spread};
+use super::turned_cloud::{ROUND, TurnedCloud};
 use crate::evaluate::Share;
 use crate::paper::estimate::Estimate;
 use crate::report::{Cell, Table};
@@ -14,10 +14,10 @@ fn percent(change: Estimate) -> Cell {
 }
 
 /// A row for each run: the change of the count, lattice by lattice.
-pub fn summary(runs: &[Run]) -> Table {
+pub fn summary(runs: &[TurnedCloud]) -> Table {
     let others = LatticeKind::ALL.into_iter().skip(1).map(Laid::paper);
     let laid: Vec<Laid> = others.chain(ROUND.map(Laid::flat)).collect();
-    let row = |run: &Run| {
+    let row = |run: &TurnedCloud| {
         let cubic = run.cubic();
         let count = cubic.map(|cubic| Estimate::of(cubic.counts.iter().copied()).mean);
         let mut row = vec![
@@ -43,7 +43,7 @@ pub fn summary(runs: &[Run]) -> Table {
 }
 
 /// A row for each lattice of each run.
-pub fn details(runs: &[Run]) -> Table {
+pub fn details(runs: &[TurnedCloud]) -> Table {
     let columns = "points|turned by|cell volume (m³)|lattice|poses|voxels|±|to cubic (%)|±|std of voxels|\
         ±|std to cubic|mean distance (m)|to cubic (%)|±|poses at which cubic takes fewer (%)|\
         95 % interval";
@@ -62,8 +62,11 @@ pub fn details(runs: &[Run]) -> Table {
             ];
             row.extend(Estimate::of(measured.counts.iter().copied()).cells(1.0, 1));
             row.extend(measured.count_to(cubic).cells(100.0, 2));
-            row.extend(spread(measured).cells(1.0, 1));
-            row.push(Cell::Number(spread(measured).mean / spread(cubic).mean, 3));
+            row.extend(measured.spread().cells(1.0, 1));
+            row.push(Cell::Number(
+                measured.spread().mean / cubic.spread().mean,
+                3,
+            ));
             let mean = Estimate::of(measured.means_m.iter().copied()).mean;
             row.push(Cell::Number(mean, 5));
             row.extend(measured.mean_to(cubic).cells(100.0, 2));

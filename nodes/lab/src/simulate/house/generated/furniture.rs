@@ -1,8 +1,8 @@
 //! Pieces of furniture. Each has its back at y = 0 and its middle at x = 0; the front is towards +y.
 
 use super::builder::{Builder, Spot};
-use super::{
-    BED, BOOKSHELF, CABINET, CHAIR, COUNTER, DESK, FRIDGE, OTHER, PICTURE, SOFA, TABLE, TV, between,
+use super::classes::{
+    BED, BOOKSHELF, CABINET, CHAIR, COUNTER, DESK, FRIDGE, OTHER, PICTURE, SOFA, TABLE, TV,
 };
 use crate::simulate::random::Stream;
 
@@ -56,7 +56,7 @@ pub(super) fn desk(b: &mut Builder, spot: Spot, [width, depth, height]: [f32; 3]
         [width / 2.0 - 0.45, 0.05, 0.1],
         [width / 2.0 - 0.02, depth - 0.05, height - 0.04],
     );
-    let x = between(s, -0.3, 0.1);
+    let x = s.between(-0.3, 0.1);
     b.thing(OTHER, spot)
         .block(
             [x - 0.3, 0.15, height + 0.1],
@@ -69,10 +69,10 @@ pub(super) fn desk(b: &mut Builder, spot: Spot, [width, depth, height]: [f32; 3]
         );
     for _ in 0..4 {
         let (x, y) = (
-            between(s, -width / 2.0 + 0.1, width / 2.0 - 0.2),
-            between(s, 0.3, depth - 0.15),
+            s.between(-width / 2.0 + 0.1, width / 2.0 - 0.2),
+            s.between(0.3, depth - 0.15),
         );
-        let high = height + between(s, 0.02, 0.16);
+        let high = height + s.between(0.02, 0.16);
         b.thing(OTHER, spot)
             .block([x, y, height], [x + 0.12, y + 0.1, high]);
     }
@@ -127,13 +127,13 @@ pub(super) fn bookshelf(b: &mut Builder, spot: Spot, [width, height]: [f32; 2], 
         shelf.block([-half, 0.0, z], [half, DEPTH, z + 0.025]);
         let mut x = -half + 0.05;
         while board < boards && x < half - 0.1 {
-            let wide = between(s, 0.02, 0.06);
-            let high = between(s, 0.18, step - 0.07);
-            let deep = between(s, 0.16, 0.26);
+            let wide = s.between(0.02, 0.06);
+            let high = s.between(0.18, step - 0.07);
+            let deep = s.between(0.16, 0.26);
             if s.uniform() < 0.8 {
                 shelf.block([x, 0.02, z + 0.025], [x + wide, deep, z + 0.025 + high]);
             } else {
-                x += between(s, 0.05, 0.25);
+                x += s.between(0.05, 0.25);
             }
             x += wide + 0.003;
         }
@@ -201,8 +201,8 @@ pub(super) fn plant(b: &mut Builder, spot: Spot, s: &mut Stream) {
     let plant = b.thing(OTHER, spot);
     plant.drum([0.0, 0.0], [0.0, 0.35], [0.15, 0.2]);
     for _ in 0..9 {
-        let (x, y) = (between(s, -0.25, 0.25), between(s, -0.25, 0.25));
-        let z = between(s, 0.45, 1.1);
+        let (x, y) = (s.between(-0.25, 0.25), s.between(-0.25, 0.25));
+        let z = s.between(0.45, 1.1);
         plant.drum([x, y], [z, z + 0.18], [0.02, 0.12]);
     }
     plant.drum([0.0, 0.0], [0.35, 1.0], [0.03, 0.02]);
@@ -211,9 +211,9 @@ pub(super) fn plant(b: &mut Builder, spot: Spot, s: &mut Stream) {
 /// A box or drum of some size on the floor.
 pub(super) fn clutter(b: &mut Builder, spot: Spot, s: &mut Stream) {
     let size = [
-        between(s, 0.15, 0.4),
-        between(s, 0.15, 0.4),
-        between(s, 0.15, 0.6),
+        s.between(0.15, 0.4),
+        s.between(0.15, 0.4),
+        s.between(0.15, 0.6),
     ];
     let thing = b.thing(OTHER, spot);
     if s.uniform() < 0.6 {

@@ -1,8 +1,9 @@
 //! Furniture of each room, as `rooms.txt` lists it.
 
 use super::builder::{Builder, Spot};
+use super::classes::{COUNTER, OTHER};
 use super::furniture::*;
-use super::{COUNTER, OTHER, between, lines};
+use super::listing::lines;
 use crate::AnyError;
 use crate::simulate::random::Stream;
 
@@ -37,13 +38,13 @@ fn spot<'a>(place: &str, n: &'a [f32], s: &mut Stream) -> Option<(Spot, &'a [f32
         ("at", [yaw, rest @ ..]) => (at(along, wall, *yaw), rest),
         ("left", [yaw, rest @ ..]) => {
             // Moved and turned a little, as people leave chairs.
-            let mut off = |most: f32| between(s, -most, most);
+            let mut off = |most: f32| s.between(-most, most);
             (
                 at(along + off(0.07), wall + off(0.07), yaw + off(18.0)),
                 rest,
             )
         }
-        ("anyhow", _) => (at(along, wall, between(s, 0.0, 90.0)), rest),
+        ("anyhow", _) => (at(along, wall, s.between(0.0, 90.0)), rest),
         _ => return None,
     })
 }

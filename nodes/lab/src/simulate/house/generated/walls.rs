@@ -1,7 +1,8 @@
 //! Floor, walls, doors and windows.
 
 use super::builder::{Builder, Spot};
-use super::{CEILING, CURTAIN, DOOR, FLOOR, WALL, WINDOW, lines};
+use super::classes::{CEILING, CURTAIN, DOOR, FLOOR, WALL, WINDOW};
+use super::listing::lines;
 use crate::AnyError;
 
 /// Height of the rooms, m.

@@ -1,6 +1,6 @@
 //! Lamps below the ceilings of a house, and how they light a surface.
 
-use super::{Light, material};
+use super::light::{Light, color};
 use crate::simulate::house::House;
 use crate::simulate::random::Stream;
 use nalgebra::{Point3, Vector3};
@@ -46,13 +46,13 @@ impl Lamps {
         let warmth = between([0.0, 0.35]);
         let lamp = |cell_m: [f64; 2]| {
             let height_m = between(HEIGHTS_M);
-            let tint = material::color(35.0, warmth * between([0.5, 1.0]), 1.0);
+            let tint = color(35.0, warmth * between([0.5, 1.0]), 1.0);
             let power = between([0.5, 2.5]) as f32;
             (house.free.above_m(cell_m, height_m), tint * power)
         };
         let lamps = places.into_iter().map(lamp).collect();
         let strength = between([0.12, 0.4]) as f32;
-        let tint = material::color(between([0.0, 360.0]), between([0.0, 0.15]), 1.0);
+        let tint = color(between([0.0, 360.0]), between([0.0, 0.15]), 1.0);
         Lamps {
             lamps,
             ambient: [

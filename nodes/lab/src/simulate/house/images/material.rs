@@ -1,33 +1,12 @@
 //! Materials of things: colours and patterns, drawn by class.
 
-use super::Light;
-use super::pattern::{cell, noise, unit};
+use super::light::{Light, color};
+use super::pattern::{Pattern, cell, noise, unit};
 use super::recipes::{Recipe, recipes};
 use crate::simulate::house::House;
 use crate::simulate::house::regions::Thing;
 use crate::simulate::random::{Purpose, Stream};
 use nalgebra::Vector3;
-
-/// Kind of a pattern.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) enum Pattern {
-    /// One colour.
-    Plain,
-    /// Two colours in spots.
-    Mottled,
-    /// Two colours in upright stripes, or in stripes along the floor.
-    Stripes,
-    /// Two colours in squares.
-    Checker,
-    /// Squares with joints.
-    Tiles,
-    /// Rings of a tree, in boards.
-    Wood,
-    /// Backs of books in rows where it is upright.
-    Books,
-    /// Spots of many colours.
-    Painting,
-}
 
 /// The material of one thing.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -44,16 +23,6 @@ pub(super) struct Material {
     pub gloss: f32,
     /// Light of its own.
     pub glow: f32,
-}
-
-/// A colour of hue in degrees, saturation and value, both from 0 to 1; made linear.
-pub(super) fn color(hue_deg: f64, saturation: f64, value: f64) -> Light {
-    let channel = |n: f64| {
-        let k = (n + hue_deg / 60.0).rem_euclid(6.0);
-        let c = value - value * saturation * k.min(4.0 - k).clamp(0.0, 1.0);
-        c.powf(2.2) as f32
-    };
-    Light::new(channel(5.0), channel(3.0), channel(1.0))
 }
 
 /// Materials of all things of a house: things of a class differ, but for walls and ceilings, which in most houses

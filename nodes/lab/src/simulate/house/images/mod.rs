@@ -16,6 +16,7 @@
 //! ```
 
 mod lamps;
+mod light;
 mod material;
 mod optics;
 mod pattern;
@@ -33,15 +34,13 @@ use super::robot::{RANGE_M, depth_noise_m};
 use crate::simulate::random::{Purpose, Stream};
 use lamps::Lamps;
 use lattice_core::registration::UNLABELED;
+use light::Light;
 use material::Material;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
 /// Farthest surface that is seen, metres.
 const MAX_M: f64 = 60.0;
-
-/// Red, green and blue, linear in the light.
-type Light = Vector3<f32>;
 
 /// A house with the look of everything in it: materials and lamps.
 pub struct RoomImages<'a> {
@@ -82,8 +81,8 @@ impl<'a> RoomImages<'a> {
         let mut stream = Stream::new(seed, Purpose::Lamps, 0, 0);
         let lamps = Lamps::new(house, &mut stream);
         let hue_deg = 360.0 * stream.uniform();
-        let above = material::color(200.0 + 40.0 * stream.uniform(), 0.3 * stream.uniform(), 0.9);
-        let below = material::color(hue_deg, 0.2 * stream.uniform(), 0.3 * stream.uniform());
+        let above = light::color(200.0 + 40.0 * stream.uniform(), 0.3 * stream.uniform(), 0.9);
+        let below = light::color(hue_deg, 0.2 * stream.uniform(), 0.3 * stream.uniform());
         RoomImages {
             house,
             materials: material::of_things(house, seed),

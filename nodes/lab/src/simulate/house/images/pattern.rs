@@ -1,4 +1,25 @@
-//! Patterns of materials: numbers at places, the same wherever they are computed.
+//! Patterns of materials, and numbers at places that are the same wherever they are computed.
+
+/// Kind of a pattern.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Pattern {
+    /// One colour.
+    Plain,
+    /// Two colours in spots.
+    Mottled,
+    /// Two colours in upright stripes, or in stripes along the floor.
+    Stripes,
+    /// Two colours in squares.
+    Checker,
+    /// Squares with joints.
+    Tiles,
+    /// Rings of a tree, in boards.
+    Wood,
+    /// Backs of books in rows where it is upright.
+    Books,
+    /// Spots of many colours.
+    Painting,
+}
 
 /// A number of 32 bits that looks random, of three whole numbers.
 pub(super) fn hash([x, y, z]: [i32; 3], seed: u32) -> u32 {

@@ -1,6 +1,6 @@
 //! Recipes of materials for each class.
 
-use super::material::Pattern;
+use super::pattern::Pattern;
 
 /// Ranges that a material is drawn from.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,8 @@
 //! Colours that a sensor makes of light: exposure, white balance, vignetting, noise.
 
+use super::light::Light;
+use super::optics::RoomCamera;
 use super::pattern::hash;
-use super::{Light, RoomCamera};
 use crate::simulate::random::{Purpose, Stream};
 
 /// Darkest mean light that the exposure makes up for.

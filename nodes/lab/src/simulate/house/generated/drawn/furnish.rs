@@ -1,8 +1,9 @@
 //! Furniture of drawn rooms: pieces along walls and in the middle that do not stand in each other.
 
+use super::super::builder::{Builder, Spot};
+use super::super::classes::{OTHER, TABLE};
 use super::super::furniture::*;
-use super::super::{OTHER, Spot, TABLE, between};
-use super::{Builder, Stream};
+use crate::simulate::random::Stream;
 
 /// Distance from the middle of a wall to furniture against it, metres.
 const GAP: f32 = 0.08;
@@ -174,7 +175,7 @@ impl Room {
     fn amid(&mut self, s: &mut Stream, side: f32) -> Option<[f32; 2]> {
         let [low_x, high_x, low_y, high_y] = self.area;
         for _ in 0..TRIES {
-            let (x, y) = (between(s, low_x, high_x), between(s, low_y, high_y));
+            let (x, y) = (s.between(low_x, high_x), s.between(low_y, high_y));
             let half = side / 2.0;
             if self.take([x - half, x + half, y - half, y + half]) {
                 return Some([x, y]);
@@ -208,7 +209,7 @@ pub(super) fn room(b: &mut Builder, s: &mut Stream, mut room: Room, number: usiz
 
 /// Width, depth and height, each drawn between two, metres.
 fn size(s: &mut Stream, ranges_m: [[f32; 2]; 3]) -> [f32; 3] {
-    ranges_m.map(|[low_m, high_m]| between(s, low_m, high_m))
+    ranges_m.map(|[low_m, high_m]| s.between(low_m, high_m))
 }
 
 fn add(b: &mut Builder, s: &mut Stream, room: &mut Room, piece: &str) -> Option<()> {
@@ -216,7 +217,7 @@ fn add(b: &mut Builder, s: &mut Stream, room: &mut Room, piece: &str) -> Option<
         "tv" => stand_with_tv(b, s, room)?,
         "dining" => dining(b, s, room)?,
         "sofa" => {
-            let wide = between(s, 1.0, 2.4);
+            let wide = s.between(1.0, 2.4);
             let spot = room.at_wall(s, wide, 0.9, 0.4)?;
             sofa(b, spot, wide);
         }
@@ -226,7 +227,7 @@ fn add(b: &mut Builder, s: &mut Stream, room: &mut Room, piece: &str) -> Option<
             any_table(b, s, at(x, y - size[1] / 2.0, 0.0), size);
         }
         "bookshelf" => {
-            let size = [between(s, 0.7, 2.0), between(s, 1.0, 2.3)];
+            let size = [s.between(0.7, 2.0), s.between(1.0, 2.3)];
             let spot = room.at_wall(s, size[0], 0.3, 0.5)?;
             bookshelf(b, spot, size, s);
         }
@@ -243,18 +244,18 @@ fn add(b: &mut Builder, s: &mut Stream, room: &mut Room, piece: &str) -> Option<
             cabinet(b, spot, size, doors);
         }
         "night table" => {
-            let size = [0.45, 0.4, between(s, 0.4, 0.6)];
+            let size = [0.45, 0.4, s.between(0.4, 0.6)];
             let spot = room.at_wall(s, size[0], size[1], 0.1)?;
             cabinet(b, spot, size, 1);
         }
         "desk" => study_desk(b, s, room)?,
         "bed" => {
-            let wide = between(s, 0.9, 2.0);
+            let wide = s.between(0.9, 2.0);
             let spot = room.at_wall(s, wide, 2.1, 0.3)?;
             bed(b, spot, wide);
         }
         "counter" => {
-            let wide = between(s, 1.2, 2.6);
+            let wide = s.between(1.2, 2.6);
             let spot = room.at_wall(s, wide, 0.65, 0.5)?;
             counter(b, spot, wide);
         }
@@ -264,7 +265,7 @@ fn add(b: &mut Builder, s: &mut Stream, room: &mut Room, piece: &str) -> Option<
         }
         "lamp" => {
             let [x, y] = room.amid(s, 0.45)?;
-            lamp(b, at(x, y, 0.0), between(s, 1.2, 1.7));
+            lamp(b, at(x, y, 0.0), s.between(1.2, 1.7));
         }
         "plant" => {
             let [x, y] = room.amid(s, 0.55)?;
@@ -272,18 +273,18 @@ fn add(b: &mut Builder, s: &mut Stream, room: &mut Room, piece: &str) -> Option<
         }
         "chair" => {
             let [x, y] = room.amid(s, 0.7)?;
-            let yaw_deg = between(s, 0.0, 360.0);
+            let yaw_deg = s.between(0.0, 360.0);
             any_chair(b, s, at(x, y, yaw_deg));
         }
         "picture" => {
-            let size = [between(s, 0.4, 1.2), between(s, 0.3, 0.9)];
+            let size = [s.between(0.4, 1.2), s.between(0.3, 0.9)];
             // It hangs above what stands there.
             let spot = Room::new(room.area, Vec::new()).at_wall(s, size[0], 0.05, 0.0)?;
-            picture(b, spot, size, between(s, 1.25, 1.6));
+            picture(b, spot, size, s.between(1.25, 1.6));
         }
         _ => {
             let [x, y] = room.amid(s, 0.5)?;
-            let yaw_deg = between(s, 0.0, 90.0);
+            let yaw_deg = s.between(0.0, 90.0);
             clutter(b, at(x, y, yaw_deg), s);
         }
     }
@@ -292,16 +293,16 @@ fn add(b: &mut Builder, s: &mut Stream, room: &mut Room, piece: &str) -> Option<
 
 /// A low cabinet with a television on it, or one that hangs on the wall.
 fn stand_with_tv(b: &mut Builder, s: &mut Stream, room: &mut Room) -> Option<()> {
-    let wide = between(s, 0.7, 1.5);
+    let wide = s.between(0.7, 1.5);
     if s.uniform() < 0.25 {
         let spot = room.at_wall(s, wide, 0.2, 0.9)?;
-        tv(b, spot, wide, between(s, 0.9, 1.3));
+        tv(b, spot, wide, s.between(0.9, 1.3));
         return Some(());
     }
     let size = [
-        wide + between(s, 0.1, 0.9),
-        between(s, 0.35, 0.5),
-        between(s, 0.35, 0.7),
+        wide + s.between(0.1, 0.9),
+        s.between(0.35, 0.5),
+        s.between(0.35, 0.7),
     ];
     let doors = (s.uniform() * 4.0) as i32 + 1;
     let spot = room.at_wall(s, size[0], size[1], 0.9)?;
@@ -328,20 +329,20 @@ fn dining(b: &mut Builder, s: &mut Stream, room: &mut Room) -> Option<()> {
     for side in [-1.0_f32, 1.0] {
         for seat in 0..seats {
             let along = size[0] * ((seat as f32 + 0.5) / seats as f32 - 0.5);
-            let along = along + between(s, -0.08, 0.08);
-            let across = side * (size[1] / 2.0 + between(s, 0.05, 0.35));
-            let turn = if side < 0.0 { 0.0 } else { 180.0 } + between(s, -20.0, 20.0);
+            let along = along + s.between(-0.08, 0.08);
+            let across = side * (size[1] / 2.0 + s.between(0.05, 0.35));
+            let turn = if side < 0.0 { 0.0 } else { 180.0 } + s.between(-20.0, 20.0);
             if s.uniform() < 0.85 {
                 chair(b, place(along, across, turn));
             }
         }
     }
     for _ in 0..2 {
-        let (along, across) = (between(s, -0.3, 0.3), between(s, -0.2, 0.2));
-        let wide = between(s, 0.05, 0.14);
+        let (along, across) = (s.between(-0.3, 0.3), s.between(-0.2, 0.2));
+        let wide = s.between(0.05, 0.14);
         b.thing(OTHER, place(along, across, 0.0)).drum(
             [0.0, 0.0],
-            [size[2], size[2] + between(s, 0.08, 0.3)],
+            [size[2], size[2] + s.between(0.08, 0.3)],
             [wide, wide * 0.8],
         );
     }
@@ -353,11 +354,11 @@ fn study_desk(b: &mut Builder, s: &mut Stream, room: &mut Room) -> Option<()> {
     let spot = room.at_wall(s, size[0], size[1], 0.8)?;
     desk(b, spot, size, s);
     let (sin, cos) = spot.yaw_deg.to_radians().sin_cos();
-    let (along, across) = (between(s, -0.2, 0.2), size[1] + between(s, 0.1, 0.35));
+    let (along, across) = (s.between(-0.2, 0.2), size[1] + s.between(0.1, 0.35));
     let seat = at(
         spot.x + cos * along - sin * across,
         spot.y + sin * along + cos * across,
-        spot.yaw_deg + 180.0 + between(s, -40.0, 40.0),
+        spot.yaw_deg + 180.0 + s.between(-40.0, 40.0),
     );
     any_chair(b, s, seat);
     Some(())

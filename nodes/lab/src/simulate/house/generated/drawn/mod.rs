@@ -3,8 +3,10 @@
 mod furnish;
 mod plan;
 
-use super::{Builder, CEILING, FLOOR, House, names};
+use super::builder::Builder;
+use super::classes::{CEILING, FLOOR, names};
 use crate::AnyError;
+use crate::simulate::house::House;
 use crate::simulate::random::{Purpose, Stream};
 use plan::Plan;
 

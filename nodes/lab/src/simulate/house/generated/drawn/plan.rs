@@ -1,9 +1,9 @@
 //! The plan of a drawn house: rooms in rows, walls with doors and windows between them.
 
+use super::super::builder::{Builder, Spot};
 use super::super::walls::{Opening, curtain, wall};
-use super::super::{Spot, between};
 use super::furnish::Room;
-use super::{Builder, Stream};
+use crate::simulate::random::Stream;
 
 /// Rooms side by side and one behind the other, with the height of their walls.
 pub(super) struct Plan {
@@ -27,7 +27,7 @@ impl Plan {
             let mut at = vec![0.0];
             for _ in 0..count {
                 let last = at.last().copied().unwrap_or(0.0);
-                at.push(last + between(s, low, high));
+                at.push(last + s.between(low, high));
             }
             at
         };
@@ -35,7 +35,7 @@ impl Plan {
         let mut plan = Plan {
             x_m,
             y_m,
-            height_m: between(s, 2.4, 3.1),
+            height_m: s.between(2.4, 3.1),
             doorways: Vec::new(),
             walls: Vec::new(),
             curtains: Vec::new(),
@@ -82,9 +82,9 @@ impl Plan {
             (s.uniform() < 0.65).then(|| self.window(s, &spot, [from, to], is_first))
         } else {
             (s.uniform() < 0.85).then(|| {
-                let wide = between(s, 0.8, 1.7).min(long - 0.9);
-                let at = from + between(s, 0.35, long - wide - 0.35);
-                let leaf = (wide < 1.2 && s.uniform() < 0.7).then(|| between(s, -100.0, 100.0));
+                let wide = s.between(0.8, 1.7).min(long - 0.9);
+                let at = from + s.between(0.35, long - wide - 0.35);
+                let leaf = (wide < 1.2 && s.uniform() < 0.7).then(|| s.between(-100.0, 100.0));
                 self.keep_free(&spot, at, at + wide);
                 Opening::Door(at, at + wide, leaf)
             })
@@ -100,9 +100,9 @@ impl Plan {
         [from, to]: [f32; 2],
         is_first: bool,
     ) -> Opening {
-        let wide = between(s, 0.7, 2.2).min(to - from - 1.0);
-        let at = from + between(s, 0.5, to - from - wide - 0.5);
-        let (sill, lintel) = (between(s, 0.3, 1.2), between(s, 1.9, 2.3));
+        let wide = s.between(0.7, 2.2).min(to - from - 1.0);
+        let at = from + s.between(0.5, to - from - wide - 0.5);
+        let (sill, lintel) = (s.between(0.3, 1.2), s.between(1.9, 2.3));
         if s.uniform() < 0.45 {
             // Before the window, on the side of the room.
             let (sin, cos) = spot.yaw_deg.to_radians().sin_cos();
@@ -113,7 +113,7 @@ impl Plan {
                 y: spot.y + sin * along + cos * side,
                 yaw_deg: spot.yaw_deg,
             };
-            let drawn = between(s, 0.3, 1.0) * (wide + 0.2);
+            let drawn = s.between(0.3, 1.0) * (wide + 0.2);
             self.curtains.push((place, drawn));
         }
         Opening::Window(at, at + wide, sill, lintel)

@@ -1,9 +1,9 @@
 //! Eq. (9): how far a calibration is off, and what that depends on.
 
-use super::Context;
 use crate::AnyError;
 use crate::evaluate::{PRINTED, quantile};
 use crate::metrics::PoseError;
+use crate::paper::calibration::context::Context;
 use crate::paper::streams::{Purpose, stream};
 use crate::random::Stream;
 use crate::report::plot::{Area, Curve, Layout, curves, svg};
