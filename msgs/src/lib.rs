@@ -1,7 +1,7 @@
 //! ROS 2 messages as serde structs.
 //!
 //! One module per ROS package, with the names of ROS; a field named `type` is `type_` here.
-//! The layout is that of Jazzy.
+//! The layout is that of Jazzy; of `nav2_msgs` that of Kilted.
 //!
 //! | to | begin with |
 //! |---|---|

@@ -37,6 +37,8 @@ packages! {
     livox_ros_driver2,
     /// Updates of occupancy grids.
     map_msgs,
+    /// Path planning of Nav2, in the layout of Kilted and later.
+    nav2_msgs,
     /// Odometry, paths and occupancy grids.
     nav_msgs,
     /// Inertial solution of the NovAtel OEM7 driver (ROS 2 branches).

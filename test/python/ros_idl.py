@@ -268,6 +268,7 @@ HeadsetMesh = ros(
     classes=sequence[uint16],
 )
 PoseStamped = ros("geometry_msgs/msg/PoseStamped", header=Header, pose=Pose)
+Path = ros("nav_msgs/msg/Path", header=Header, poses=sequence[PoseStamped])
 ASKS = {"has_guess": bool, "guess": Pose, "session": str}
 ANSWERS = {"success": bool, "message": str, "result": CalibrationResult}
 CalibrateRequest = ros("lattice_msgs/srv/Calibrate_Request", **ASKED, **ASKS)
@@ -293,6 +294,21 @@ SendGoalResponse = ros(f"{CALIBRATE}_SendGoal_Response", **ASKED, accepted=bool,
 GetResultRequest = ros(f"{CALIBRATE}_GetResult_Request", **ASKED, goal_id=UUID)
 GetResultResponse = ros(f"{CALIBRATE}_GetResult_Response", **ASKED, status=int8, result=Result)
 FeedbackMessage = ros(f"{CALIBRATE}_FeedbackMessage", goal_id=UUID, feedback=Feedback)
+
+PLAN = "nav2_msgs/action/ComputePathToPose"
+PlanGoal = ros(
+    f"{PLAN}_Goal", goal=PoseStamped, start=PoseStamped, planner_id=str, use_start=bool
+)
+PLANNED = {"path": Path, "planning_time": Duration, "error_code": uint16}
+PLANNED_IN = {"jazzy": PLANNED, "kilted": {**PLANNED, "error_msg": str}}
+PlanSendRequest = ros(f"{PLAN}_SendGoal_Request", **ASKED, goal_id=UUID, goal=PlanGoal)
+PlanSendResponse = ros(f"{PLAN}_SendGoal_Response", **ASKED, accepted=bool, stamp=Time)
+PlanResultRequest = ros(f"{PLAN}_GetResult_Request", **ASKED, goal_id=UUID)
+
+
+def plan_result_response(distribution):
+    result = ros(f"{PLAN}_Result", **PLANNED_IN[distribution])
+    return ros(f"{PLAN}_GetResult_Response", **ASKED, status=int8, result=result)
 
 
 RCL = "rcl_interfaces/msg"

@@ -1,13 +1,16 @@
 //! Nodes of ours, each with a participant of its own, and a peer in Python of CycloneDDS.
 
+use std::ffi::OsStr;
+use std::io::{BufRead, BufReader, Lines};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 
 use lattice_nodes::executables;
 use lattice_nodes::start::Finish;
 use lattice_runtime::Runtime;
 use lattice_runtime::env::Network;
 use lattice_runtime::ros_args::RosArgs;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::domain::TestDomain;
@@ -47,6 +50,39 @@ impl Nodes {
 /// Parameters separated by blanks.
 pub fn params(line: &str) -> Vec<String> {
     line.split_whitespace().map(str::to_owned).collect()
+}
+
+/// A script of the peer at work, which ends when this is dropped.
+pub struct Script {
+    child: Child,
+    lines: Lines<BufReader<ChildStdout>>,
+}
+
+impl Script {
+    /// Starts a script.
+    pub fn start<A: AsRef<OsStr>>(
+        python: &Path,
+        name: &str,
+        args: impl IntoIterator<Item = A>,
+    ) -> Self {
+        let mut command = Command::new(python);
+        command.arg(script(name)).args(args).stdout(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        Self { child, lines }
+    }
+
+    /// The next line that it prints.
+    pub fn line<T: DeserializeOwned>(&mut self) -> T {
+        serde_json::from_str(&self.lines.next().unwrap().unwrap()).unwrap()
+    }
+}
+
+impl Drop for Script {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
 }
 
 /// Runs a script of the peer to its end and reads the line that it prints.

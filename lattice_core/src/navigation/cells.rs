@@ -6,7 +6,8 @@ use rustc_hash::FxHashMap;
 use super::GroundOptions;
 use super::columns::Column;
 use super::grid::{Cell, Grid};
-use super::reach::{CORNERS, EDGES, Reached, beside, linked};
+use super::reach::Reached;
+use super::surface_graph::{CORNERS, EDGES, beside, linked};
 use super::surfaces::ColumnState;
 
 /// Paints the grid.

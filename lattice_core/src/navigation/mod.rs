@@ -14,6 +14,8 @@
 //!    reached column; and the edge of a drop. Between two seen heights whose mean slope is too steep something is
 //!    too steep: a drop-off whose side was never seen. All else is unknown.
 //!
+//! [`GroundMap`] has the linked surfaces of all floors, and finds paths of a robot on them.
+//!
 //! Every figure depends on the voxels alone, so a grid after any history of changes is that of the map as it is.
 
 mod cells;
@@ -21,8 +23,16 @@ mod columns;
 mod flat;
 mod grid;
 mod grid_limit;
+mod ground_map;
+mod ground_path_error;
+mod ground_search;
 mod options;
+mod path_ends;
+mod path_points;
 mod reach;
+mod robot_room;
+mod surface_graph;
+mod surface_steps;
 mod surfaces;
 mod terrain;
 
@@ -34,11 +44,14 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use self::columns::{Column, Columns};
 use self::reach::Reached;
+use self::surface_graph::SurfaceGraph;
 use self::surfaces::ColumnState;
 use crate::lattice::{Lattice, MortonKey};
 
 pub use flat::FreeCells;
 pub use grid::{Cell, Grid, MAX_GRID_CELLS};
+pub use ground_map::{GroundMap, GroundPath, GroundPathOptions};
+pub use ground_path_error::{GroundPathError, PathEnd};
 pub use options::{GroundOptions, ProjectionError, ProjectionRule, ProjectorOptions};
 
 /// Projection of a map onto the ground, kept up to date with its changes.
@@ -126,6 +139,16 @@ impl Projector {
         self.refresh(&ground);
         let reached = Reached::new(&self.states, self.resolution_m(), &ground, robot_m)?;
         Ok(cells::paint(&self.states, &reached, &ground))
+    }
+
+    /// Ground of the map as it is, to search paths on; an error with [`ProjectionRule::Flat`].
+    pub fn ground_map(&mut self) -> Result<GroundMap, GroundPathError> {
+        let ProjectionRule::Ground(ground) = self.options.rule else {
+            return Err(GroundPathError::FlatRule);
+        };
+        self.refresh(&ground);
+        let graph = SurfaceGraph::new(&self.states, self.resolution_m(), &ground)?;
+        Ok(GroundMap::new(graph, ground))
     }
 
     /// Brings surfaces and their inclinations up to date where samples changed.

@@ -4,7 +4,9 @@ use self::world::{Mapped, Score, Truth, World};
 use super::*;
 use crate::lattice::LatticeKind;
 
+mod brute_paths;
 mod changes;
+mod paths;
 mod world;
 
 const SEEDS: u64 = 4;

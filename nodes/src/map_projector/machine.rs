@@ -1,6 +1,8 @@
 //! State machine of the projector, without I/O.
 
-use lattice_core::navigation::{Cell, FreeCells, Grid, ProjectionError, ProjectionRule, Projector};
+use lattice_core::navigation::{
+    Cell, FreeCells, Grid, GroundMap, GroundPathError, ProjectionError, ProjectionRule, Projector,
+};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::map_msgs::OccupancyGridUpdate;
 use lattice_msgs::nav_msgs::OccupancyGrid;
@@ -10,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::messages::grid_message;
 use super::options::MapProjectorOptions;
+use super::plan_counts::PlanCounts;
 use super::window::Window;
 use super::{changes, messages};
 use crate::convert::geometry;
@@ -56,6 +59,9 @@ pub struct ProjectorReport {
     pub undecodable: u64,
     /// Transforms that are not finite or do not fit the tree.
     pub transforms_refused: u64,
+    /// Goals of the planner.
+    #[serde(default)]
+    pub plans: PlanCounts,
 }
 
 /// Messages of one change of the grid.
@@ -204,21 +210,21 @@ impl MapProjector {
         Some(grid_message(grid, header_of(map)))
     }
 
+    /// Ground of the map as it is, to plan on; `None` before the first whole map.
+    pub fn ground_map(&mut self) -> Option<Result<GroundMap, GroundPathError>> {
+        self.follower.sequence()?;
+        let projector = projector_of(&mut self.projector, &self.follower, &self.options);
+        projector
+            .map_err(GroundPathError::from)
+            .transpose()
+            .map(|projector| projector?.ground_map())
+    }
+
     /// Makes the grid in its window.
     fn make(&mut self) -> Result<Option<Grid>, ProjectionError> {
-        let Some(map) = self.follower.map() else {
+        let Some(projector) = projector_of(&mut self.projector, &self.follower, &self.options)?
+        else {
             return Ok(None);
-        };
-        let projector = match &mut self.projector {
-            Some(projector) => projector,
-            none => {
-                let mut projector =
-                    Projector::new(&map.lattice, map.datum_m, self.options.projector)?;
-                for (key, state) in map.voxels() {
-                    projector.set(*key, Some(offset_m(map, state)));
-                }
-                none.insert(projector)
-            }
         };
         let free = self
             .free
@@ -309,6 +315,27 @@ impl MapProjector {
             }
         }
     }
+}
+
+/// Projector of a followed map, made with all of its voxels if there is none; `None` without a map.
+fn projector_of<'a>(
+    projector: &'a mut Option<Projector>,
+    follower: &MapFollower,
+    options: &MapProjectorOptions,
+) -> Result<Option<&'a mut Projector>, ProjectionError> {
+    let Some(map) = follower.map() else {
+        return Ok(None);
+    };
+    Ok(Some(match projector {
+        Some(projector) => projector,
+        none => {
+            let mut projector = Projector::new(&map.lattice, map.datum_m, options.projector)?;
+            for (key, state) in map.voxels() {
+                projector.set(*key, Some(offset_m(map, state)));
+            }
+            none.insert(projector)
+        }
+    }))
 }
 
 /// Mean of a voxel's points minus the centre of its cell, metres.

@@ -6,11 +6,14 @@ use std::time::{Duration, Instant};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::map_msgs::OccupancyGridUpdate;
 use lattice_msgs::nav_msgs::OccupancyGrid;
+use lattice_msgs::nav2_msgs::{ComputePathToPoseAction, ComputePathToPoseGoal};
 use lattice_msgs::tf2_msgs::TFMessage;
 
+use super::diagnosis::diagnosis;
 use super::parameters::Settings;
+use super::planner::Planner;
 use super::robot::RobotPosition;
-use super::{MapProjector, MapProjectorOptions, Projected, ProjectorReport};
+use super::{MapProjector, Projected, ProjectorReport};
 use crate::compute::{Compute, Inbox};
 use crate::hurry::Hurry;
 use crate::map_input::{MapLosses, MapRequests};
@@ -19,8 +22,8 @@ use crate::start::{Finish, LAST_EVENTS, LAST_FLUSH, NodeError, handed_over, open
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    Diagnostics, Level, Node, Publisher, Runtime, RuntimeError, Subscription, SubscriptionExecutor,
-    Undecoded,
+    ActionLimits, Diagnostics, GoalHandle, Node, Publisher, Runtime, RuntimeError, Subscription,
+    SubscriptionExecutor, Undecoded,
 };
 
 /// Time without a subscriber after which the map is no longer followed.
@@ -36,7 +39,13 @@ enum Event {
     Transforms(Arc<TFMessage>, bool),
     Joined,
     Project,
-    Settings(Box<MapProjectorOptions>, Duration),
+    Goal(
+        Box<ComputePathToPoseGoal>,
+        GoalHandle<ComputePathToPoseAction>,
+    ),
+    /// A goal was canceled, or a search has ended.
+    Plan,
+    Settings(Box<Settings>),
     Finish,
 }
 
@@ -51,8 +60,17 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     };
     let (losses, hurry) = (MapLosses::default(), Hurry::default());
     let requests = MapRequests::new(&node, &settings.mapper, &losses)?;
+    let planner = match settings.plan {
+        true => {
+            let path = node.publisher("plan", Qos::DEFAULT)?;
+            Some(Planner::new(settings.path, path, node.clock()))
+        }
+        false => None,
+    };
     let mut state = ComputeState {
         requests,
+        planner,
+        draws: false,
         robot: RobotPosition::new(settings.base_frame),
         needs_free: settings.projector.needs_free(),
         machine: MapProjector::new(settings.projector).hurried_by(&hurry),
@@ -84,20 +102,38 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     outputs.grid.on_subscriber_joined(move || {
         let _ = joined.send(Event::Joined, 0);
     });
-    let projects = inbox.clone();
+    let action = match settings.plan {
+        true => {
+            let (goals, canceled) = (inbox.clone(), inbox.clone());
+            let action = node.action_server::<ComputePathToPoseAction>(
+                "compute_path_to_pose",
+                ActionLimits::default(),
+                move |goal, handle| goals.send(Event::Goal(Box::new(goal), handle), 0),
+                move |_| {
+                    let _ = canceled.send(Event::Plan, 0);
+                },
+            )?;
+            Some(Arc::new(action))
+        }
+        false => None,
+    };
+    let (projects, goals) = (inbox.clone(), action.clone());
     let period = runtime.timer(settings.update_period, move || {
+        if let Some(goals) = &goals {
+            goals.expire();
+        }
         let _ = projects.send(Event::Project, 0);
     });
     open_params(params, move |params| {
         let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
-        let event = Event::Settings(Box::new(settings.projector), settings.grid_period);
-        handed_over(inbox.send(event, 0))?;
-        period.set(settings.update_period);
+        let update_period = settings.update_period;
+        handed_over(inbox.send(Event::Settings(Box::new(settings)), 0))?;
+        period.set(update_period);
         Ok(())
     });
     Ok(Box::new(move || {
         compute.finish_within(Event::Finish, LAST_EVENTS, || hurry.request());
-        Box::new(())
+        Box::new(action)
     }))
 }
 
@@ -108,7 +144,7 @@ struct Outputs {
     updates: Publisher<OccupancyGridUpdate>,
 }
 
-/// Subscriptions that are open while somebody subscribes to the grid.
+/// Subscriptions that are open while somebody subscribes to the grid, or wants a path.
 struct Inputs {
     node: Node,
     inbox: Inbox<Event>,
@@ -160,10 +196,13 @@ struct ComputeState {
     robot: RobotPosition,
     needs_free: bool,
     outputs: Outputs,
+    planner: Option<Planner>,
+    /// True once somebody has subscribed to the grid since the map is followed.
+    draws: bool,
     diagnostics: Diagnostics,
     seconds: Throttle,
     inputs: Option<Inputs>,
-    /// Last time at which somebody subscribed to the grid.
+    /// Last time at which somebody subscribed to the grid, or wanted a path.
     wanted: Instant,
     grid_period: Duration,
     /// Time of the next whole grid, if one is due for a subscriber without updates.
@@ -191,6 +230,14 @@ impl ComputeState {
             Event::Transforms(message, is_static) => {
                 self.refused += self.robot.on_tf(&message, is_static);
             }
+            Event::Goal(goal, handle) => {
+                if let Some(planner) = &mut self.planner {
+                    planner.add(goal, handle);
+                }
+                self.follow_by_demand();
+                self.plan();
+            }
+            Event::Plan => self.plan(),
             Event::Joined => {
                 self.follow_by_demand();
                 self.grid_due = Some(Instant::now());
@@ -203,24 +250,29 @@ impl ComputeState {
                     self.requests.ask_for_keyframe();
                 }
                 self.project();
+                self.plan();
                 self.diagnose();
             }
-            Event::Settings(options, grid_period) => {
-                self.machine.set_options(*options);
-                self.grid_period = grid_period;
+            Event::Settings(settings) => {
+                self.machine.set_options(settings.projector);
+                self.grid_period = settings.grid_period;
+                if let Some(planner) = &mut self.planner {
+                    planner.set_options(settings.path);
+                }
             }
             Event::Finish => self.finish(),
         }
     }
 
-    /// Subscribes to the map while somebody subscribes to the grid.
+    /// Subscribes to the map while somebody subscribes to the grid, or wants a path.
     fn follow_by_demand(&mut self) {
         let Some(inputs) = &mut self.inputs else {
             return;
         };
         let subscribers =
             self.outputs.grid.subscriber_count() + self.outputs.updates.subscriber_count();
-        if subscribers > 0 {
+        self.draws |= subscribers > 0;
+        if subscribers > 0 || self.planner.as_ref().is_some_and(Planner::is_wanted) {
             self.wanted = Instant::now();
             if inputs.open.is_empty() {
                 match inputs.open(self.needs_free) {
@@ -232,11 +284,26 @@ impl ComputeState {
         } else if !inputs.open.is_empty() && self.wanted.elapsed() > IDLE {
             inputs.open.clear();
             self.machine.clear();
+            self.draws = false;
         }
+    }
+
+    /// Serves the goals of the planner.
+    fn plan(&mut self) {
+        let (Some(planner), Some(inputs)) = (&mut self.planner, &self.inputs) else {
+            return;
+        };
+        let inbox = inputs.inbox.clone();
+        planner.serve(&mut self.machine, &self.robot, move || {
+            let _ = inbox.send(Event::Plan, 0);
+        });
     }
 
     /// Publishes what changed.
     fn project(&mut self) {
+        if !self.draws {
+            return;
+        }
         let robot_m = self
             .machine
             .map_frame()
@@ -292,6 +359,11 @@ impl ComputeState {
             lost_on_network: losses.on_network(),
             undecodable: losses.undecodable(),
             transforms_refused: self.refused,
+            plans: self
+                .planner
+                .as_ref()
+                .map(Planner::counts)
+                .unwrap_or_default(),
         }
     }
 
@@ -301,18 +373,7 @@ impl ComputeState {
             .inputs
             .as_ref()
             .is_some_and(|inputs| !inputs.open.is_empty());
-        let (level, message) = match (self.machine.error(), report.counts.messages_refused) {
-            _ if !is_followed => (Level::Ok, "nobody subscribes to projected_map".to_owned()),
-            (Some(error), _) => (Level::Error, error.to_string()),
-            (None, 0) if report.counts.messages_in == 0 => (Level::Warn, "no map yet".to_owned()),
-            (None, 0) if report.cells == [0; 3] => (Level::Warn, "no grid yet".to_owned()),
-            (None, 0) if report.cells.first() == Some(&0) => {
-                let text = "no free cell: no ground below base_frame, or limits are too tight";
-                (Level::Warn, text.to_owned())
-            }
-            (None, 0) => (Level::Ok, "OK".to_owned()),
-            (None, refused) => (Level::Warn, format!("{refused} messages rejected")),
-        };
+        let (level, message) = diagnosis(&self.machine, &report, is_followed, self.draws);
         let mut values = report::key_values(&report);
         let differences = self.machine.map_differences();
         values.push(("map_differences".into(), differences.to_string()));
@@ -329,5 +390,7 @@ impl ComputeState {
         if let Err(error) = report::write(&self.report_file, &self.report(), &self.diagnostics) {
             log::error!("{error}");
         }
+        // Its search ends with it.
+        self.planner = None;
     }
 }

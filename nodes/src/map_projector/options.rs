@@ -1,6 +1,8 @@
 //! Options of the projector.
 
-use lattice_core::navigation::{GroundOptions, ProjectionRule, ProjectorOptions};
+use lattice_core::navigation::{
+    GroundOptions, GroundPathOptions, ProjectionRule, ProjectorOptions,
+};
 
 use crate::options::one_of;
 use lattice_runtime::params::{ParamError, Params};
@@ -54,6 +56,21 @@ impl MapProjectorOptions {
             },
             room_m: params.f64_in("room_m", defaults.room_m, 0.0..=10_000.0)?,
             max_voxels: params.positive("max_voxels", defaults.max_voxels)?,
+        })
+    }
+
+    /// Reads the parameters of the planner.
+    pub(super) fn path_from_params(params: &Params) -> Result<GroundPathOptions, ParamError> {
+        let defaults = GroundPathOptions::default();
+        let lengths = 0.0..=100.0;
+        Ok(GroundPathOptions {
+            robot_radius_m: params.f64_in(
+                "robot_radius_m",
+                defaults.robot_radius_m,
+                lengths.clone(),
+            )?,
+            tolerance_m: params.f64_in("plan_tolerance_m", defaults.tolerance_m, lengths)?,
+            ..defaults
         })
     }
 

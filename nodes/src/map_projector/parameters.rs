@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use lattice_core::navigation::GroundPathOptions;
+
 use super::MapProjectorOptions;
 use crate::compute::ComputeLimits;
 use crate::options::FRAME;
@@ -18,6 +20,9 @@ const ABOUT: &[About] = about! {
     "occupancy_min_z_m": "With ground: flat, lower bound of the height band in the map frame.";
     "occupancy_max_z_m": "With ground: flat, upper bound of the height band in the map frame.";
     "base_frame" fixed(FRAME): "Frame of the robot, whose position by /tf selects the ground; without it: the lowest large surface.";
+    "plan" fixed("its action is made at the start"): "Whether the action compute_path_to_pose plans paths on the ground, in place of Nav2's planner_server; not with ground: flat.";
+    "robot_radius_m": "Radius of the robot: paths keep it away from obstacles, edges and unseen ground.";
+    "plan_tolerance_m": "Distance by which start and goal of a path may move to ground with room for the robot.";
     "room_m": "Room on each side of a grid that has to grow.";
     "update_period_s": "Shortest time between two changes of the grid.";
     "grid_period_s": "Shortest time between two whole grids where a subscriber of projected_map takes no updates.";
@@ -26,6 +31,8 @@ const ABOUT: &[About] = about! {
 /// Settings from the parameters of the node.
 pub(super) struct Settings {
     pub projector: MapProjectorOptions,
+    pub plan: bool,
+    pub path: GroundPathOptions,
     pub limits: ComputeLimits,
     pub base_frame: String,
     pub update_period: Duration,
@@ -41,6 +48,8 @@ impl Settings {
         params.describe(options::COMMON);
         Ok(Self {
             projector: MapProjectorOptions::from_params(params)?,
+            plan: params.bool("plan", false)?,
+            path: MapProjectorOptions::path_from_params(params)?,
             limits: options::compute_limits(params, 4096, 64 << 20, options::threads(params, 1)?)?,
             base_frame: options::frame(params, "base_frame", "base_link")?,
             update_period: options::period(params, "update_period_s", 0.5)?,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use lattice_core::pose::{TransformBuffer, TransformBufferOptions};
 use lattice_msgs::tf2_msgs::TFMessage;
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 
 use crate::convert::geometry;
 
@@ -55,17 +55,18 @@ impl RobotPosition {
 
     /// Position in a frame at the newest time for which all transforms are known.
     pub(super) fn in_frame(&self, map_frame: &str) -> Option<Vector3<f64>> {
+        let pose = self.pose_of(&self.base_frame, map_frame)?;
+        Some(pose.translation.vector)
+    }
+
+    /// Pose of any frame in another one at that time.
+    pub(super) fn pose_of(&self, frame: &str, map_frame: &str) -> Option<Isometry3<f64>> {
         let mut stamps_ns: Vec<i64> = self.newest_ns.values().copied().collect();
         stamps_ns.push(0);
         stamps_ns.sort_unstable();
         stamps_ns.dedup();
-        let at = |stamp_ns: &i64| {
-            self.transforms
-                .lookup(map_frame, &self.base_frame, *stamp_ns)
-                .ok()
-        };
-        let pose = stamps_ns.iter().rev().find_map(at)?;
-        Some(pose.translation.vector)
+        let at = |stamp_ns: &i64| self.transforms.lookup(map_frame, frame, *stamp_ns).ok();
+        stamps_ns.iter().rev().find_map(at)
     }
 }
 

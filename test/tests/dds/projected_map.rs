@@ -1,29 +1,21 @@
 //! `projected_map` and its updates at foreign subscribers with the QoS of Nav2: they end up with the array of the map.
 
+use std::ffi::OsStr;
 use std::fs;
-use std::io::{BufRead, BufReader, Lines};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
-use std::sync::Arc;
-use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use lattice_core::lattice::LatticeKind;
-use lattice_msgs::geometry_msgs::TransformStamped;
-use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
-use lattice_msgs::std_msgs::Empty;
-use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_nodes::lattice_mapper::LatticeMapper;
 use lattice_nodes::map_projector::{MapProjector, MapProjectorOptions, Projected, ProjectorReport};
 use lattice_nodes::report;
-use lattice_runtime::qos::Qos;
-use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{Runtime, SubscriptionExecutor};
 use lattice_test::domain::TestDomain;
 use lattice_test::maps;
-use lattice_test::peer::{Nodes, params};
-use lattice_test::python::{python, ros_pythons, script};
+use lattice_test::peer::{Nodes, Script, params};
+use lattice_test::python::{python, ros_pythons};
 use serde::Deserialize;
+
+use super::map_driver::MapDriver;
 
 /// Long enough for a loaded machine; a test that passes does not wait for it.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -37,37 +29,6 @@ struct Taken {
     updates: u64,
     resolution: f64,
     frame: String,
-}
-
-/// A subscriber in Python.
-struct Subscriber {
-    child: Child,
-    lines: Lines<BufReader<ChildStdout>>,
-}
-
-impl Subscriber {
-    fn start((python, kind): &(PathBuf, &str), domain: &TestDomain, expected: &[PathBuf]) -> Self {
-        let mut child = Command::new(python)
-            .arg(script("grid_peer.py"))
-            .args([kind, &*domain.id().to_string()])
-            .args(expected)
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-        Self { child, lines }
-    }
-
-    fn taken(&mut self) -> Taken {
-        serde_json::from_str(&self.lines.next().unwrap().unwrap()).unwrap()
-    }
-}
-
-impl Drop for Subscriber {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
 }
 
 /// Points of a floor and of a wall across it.
@@ -141,54 +102,22 @@ fn foreign_subscribers_rebuild_the_grid_from_grids_and_updates() {
         report_file.display()
     );
     let nodes = Nodes::start(&domain, &[("map_projector", params(&given))]);
-    let args = RosArgs::parse([]).unwrap();
-    let runtime = Runtime::with_transport("driver", args, &domain.transport()).unwrap();
-    let driver = runtime.node("driver").unwrap();
-    let maps = driver
-        .publisher::<LatticeMap>("voxel_map", Qos::MAP)
-        .unwrap();
-    let updates = driver
-        .publisher::<LatticeMapUpdate>("voxel_map_updates", Qos::DELTAS)
-        .unwrap();
-    let tf = driver
-        .publisher::<TFMessage>("/tf_static", Qos::TF_STATIC)
-        .unwrap();
-    let mut transform = TransformStamped::default();
-    transform.header.frame_id = "map".to_owned();
-    transform.child_frame_id = "base_link".to_owned();
-    let at = &mut transform.transform;
-    [at.translation.x, at.translation.y, at.translation.z] = ROBOT_M;
-    at.rotation.w = 1.0;
-    tf.publish(TFMessage {
-        transforms: vec![transform],
-    })
-    .unwrap();
-    // As a mapper does: a keyframe for each request, and for each subscriber that comes.
-    let (request, asked) = channel();
-    let by_topic = request.clone();
-    let _asked = driver.subscribe(
-        "lattice_mapper/request_keyframe",
-        Qos::DEFAULT,
-        SubscriptionExecutor::Shared,
-        move |_: Arc<Empty>| {
-            let _ = by_topic.send(());
-        },
-    );
-    maps.on_subscriber_joined(move || {
-        let _ = request.send(());
-    });
-    let start = |python: &(PathBuf, &str)| Subscriber::start(python, &domain, &files);
-    let mut subscribers: Vec<Subscriber> = pythons.iter().map(start).collect();
+    let driver = MapDriver::start(&domain, &[("base_link", ROBOT_M)]);
+    let start = |(python, kind): &(PathBuf, &str)| {
+        let domain = domain.id().to_string();
+        let args = [OsStr::new(kind), OsStr::new(&domain)];
+        let files = files.iter().map(|file| file.as_os_str());
+        Script::start(python, "grid_peer.py", args.into_iter().chain(files))
+    };
+    let mut subscribers: Vec<Script> = pythons.iter().map(start).collect();
     // Nobody follows the map before somebody subscribes to the grid.
-    asked.recv_timeout(PATIENCE).unwrap();
-    keyframe
-        .iter()
-        .for_each(|chunk| maps.publish(chunk.clone()).unwrap());
-    let first: Vec<Taken> = subscribers.iter_mut().map(Subscriber::taken).collect();
+    driver.until_asked(PATIENCE);
+    driver.send(&keyframe);
+    let first: Vec<Taken> = subscribers.iter_mut().map(Script::line).collect();
     update
         .iter()
-        .for_each(|chunk| updates.publish(chunk.clone()).unwrap());
-    let second: Vec<Taken> = subscribers.iter_mut().map(Subscriber::taken).collect();
+        .for_each(|chunk| driver.updates.publish(chunk.clone()).unwrap());
+    let second: Vec<Taken> = subscribers.iter_mut().map(Script::line).collect();
     for (((_, kind), first), second) in pythons.iter().zip(&first).zip(&second) {
         println!("{kind}: {first:?}, then {second:?}");
         assert_eq!(

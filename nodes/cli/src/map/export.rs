@@ -26,7 +26,7 @@ pub struct Export {
     #[arg(long, short, required_unless_present = "grid")]
     out: Option<PathBuf>,
     /// Occupancy grid to write for Nav2's map_server: a .yaml file, and an image (.pgm) beside it
-    #[arg(long, value_name = "YAML", conflicts_with_all = ["out", "form"])]
+    #[arg(long, value_name = "YAML", conflicts_with_all = ["out", "form"], group = "ground")]
     grid: Option<PathBuf>,
     #[command(flatten)]
     robot: GridOptions,

@@ -3,46 +3,26 @@
 use std::path::Path;
 
 use clap::Args;
-use lattice_core::navigation::{Cell, GroundOptions, ProjectionRule, Projector, ProjectorOptions};
+use lattice_core::navigation::Cell;
 use lattice_core::voxels::VoxelList;
 use lattice_nodes::files::atomic_write;
 use lattice_nodes::files::export::{write_grid_pgm, write_grid_yaml};
 use nalgebra::Vector3;
 
+use super::robot::RobotOptions;
 use crate::CliResult;
 
-/// Robot for which a grid is made.
+/// Robot for which a grid is made, and its place.
 #[derive(Args)]
 pub struct GridOptions {
-    /// Edge of the grid's cells, m; default: cell size of the map
-    #[arg(long, value_name = "M", requires = "grid")]
-    resolution: Option<f64>,
-    /// Height of the robot, m
-    #[arg(long, value_name = "M", default_value_t = 1.5, requires = "grid")]
-    robot_height: f64,
-    /// Highest step that the robot drives over, m
-    #[arg(long, value_name = "M", default_value_t = 0.1, requires = "grid")]
-    max_step: f64,
-    /// Steepest ground that the robot drives on, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 20.0, requires = "grid")]
-    max_slope: f64,
+    #[command(flatten)]
+    limits: RobotOptions,
     /// Position of the robot, map frame, m: the ground below it is that of the grid; default: the lowest large surface
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true, requires = "grid")]
     robot: Option<Vec<f64>>,
 }
 
 impl GridOptions {
-    fn options(&self) -> ProjectorOptions {
-        ProjectorOptions {
-            resolution_m: self.resolution.unwrap_or_default(),
-            rule: ProjectionRule::Ground(GroundOptions {
-                robot_height_m: self.robot_height,
-                max_step_m: self.max_step,
-                max_slope_deg: self.max_slope,
-            }),
-        }
-    }
-
     /// Writes the grid of a map as YAML, and its image beside it.
     pub fn write(&self, list: &VoxelList, yaml: &Path) -> CliResult {
         let extension = yaml.extension().unwrap_or_default().to_string_lossy();
@@ -52,10 +32,7 @@ impl GridOptions {
                 format!("{yaml}: --grid writes a .yaml file, with a .pgm file beside it").into(),
             );
         }
-        let mut projector = Projector::new(list.lattice(), list.datum_m(), self.options())?;
-        for (key, voxel) in list.sorted() {
-            projector.set(key, Some(voxel.mean_offset_m().into()));
-        }
+        let mut projector = self.limits.projector(list)?;
         let robot_m = self
             .robot
             .as_deref()

@@ -7,6 +7,7 @@ mod info;
 mod output;
 mod query;
 mod read;
+mod robot;
 mod save;
 
 use clap::Subcommand;
@@ -28,7 +29,7 @@ pub enum Map {
     Diff(combine::Diff),
     /// Write the voxels with their centre in a box
     Crop(combine::Crop),
-    /// Find the nearest voxels, the clearance of a point, or a short path of a ball
+    /// Find the nearest voxels, the clearance of a point, or a short path of a ball or of a robot on the ground
     Query(query::Query),
     /// Have a running mapper write its map
     Save(save::Save),

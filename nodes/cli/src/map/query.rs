@@ -6,12 +6,15 @@ use std::path::PathBuf;
 
 use clap::Args;
 use lattice_core::lattice::MortonKey;
+use lattice_core::navigation::GroundPathOptions;
 use lattice_core::query::{PathOptions, Query as Questions, Segment, Steps};
 use lattice_core::voxels::VoxelStore;
 use lattice_core::voxels::file::read_occupancy;
 use nalgebra::Vector3;
 use serde::Serialize;
 
+use super::read;
+use super::robot::RobotOptions;
 use crate::CliResult;
 
 /// Options of `lattice map query`.
@@ -32,15 +35,39 @@ pub struct Query {
     /// Find a short path of a ball between two points, in free segments between centres of cells
     #[arg(
         long, num_args = 6, value_names = ["X", "Y", "Z", "X", "Y", "Z"], allow_negative_numbers = true,
-        group = "question", requires = "radius",
+        groups = ["question", "way"], requires = "radius",
     )]
     path: Option<Vec<f64>>,
     /// Radius of the ball, m
     #[arg(long, requires = "path")]
     radius: Option<f64>,
     /// Limit of expanded cells of a path search
-    #[arg(long, default_value_t = 2_000_000, requires = "path")]
+    #[arg(long, default_value_t = 2_000_000, requires = "way")]
     max_cells: usize,
+    /// Find a short path of a robot on the ground between two points, over slopes, low steps and floors
+    #[arg(
+        long, num_args = 6, value_names = ["X", "Y", "Z", "X", "Y", "Z"], allow_negative_numbers = true,
+        groups = ["question", "ground", "way"],
+    )]
+    ground_path: Option<Vec<f64>>,
+    /// Radius of the robot, m
+    #[arg(
+        long,
+        value_name = "M",
+        default_value_t = 0.3,
+        requires = "ground_path"
+    )]
+    robot_radius: f64,
+    /// Distance by which the ends may move to ground with room for the robot, m
+    #[arg(
+        long,
+        value_name = "M",
+        default_value_t = 0.5,
+        requires = "ground_path"
+    )]
+    tolerance: f64,
+    #[command(flatten)]
+    robot: RobotOptions,
     /// Print as JSON
     #[arg(long)]
     json: bool,
@@ -73,17 +100,42 @@ enum Answer {
 impl Query {
     /// Runs the command.
     pub fn run(self) -> CliResult {
-        let here = |e: &dyn std::fmt::Display| format!("{}: {e}", self.map.display());
-        let file = File::open(&self.map).map_err(|e| here(&e))?;
-        // The file size bounds the memory.
-        let store = read_occupancy(BufReader::new(file), usize::MAX).map_err(|e| here(&e))?;
-        let answer = self.answer(&Questions::new(&store))?;
+        let answer = match self.ground_path.as_deref().and_then(ends) {
+            Some(ends) => self.on_ground(ends)?,
+            None => self.in_cells()?,
+        };
         if self.json {
             println!("{}", serde_json::to_string_pretty(&answer)?);
         } else {
             answer.print();
         }
         Ok(())
+    }
+
+    /// Answer from the occupied cells alone.
+    fn in_cells(&self) -> CliResult<Answer> {
+        let here = |e: &dyn std::fmt::Display| format!("{}: {e}", self.map.display());
+        let file = File::open(&self.map).map_err(|e| here(&e))?;
+        // The file size bounds the memory.
+        let store = read_occupancy(BufReader::new(file), usize::MAX).map_err(|e| here(&e))?;
+        self.answer(&Questions::new(&store))
+    }
+
+    /// Path on the ground, which needs the means of the points.
+    fn on_ground(&self, [start, goal]: [Vector3<f64>; 2]) -> CliResult<Answer> {
+        let list = read(&self.map)?.0.into_list(usize::MAX);
+        let ground = self.robot.projector(&list)?.ground_map()?;
+        let options = GroundPathOptions {
+            robot_radius_m: self.robot_radius,
+            tolerance_m: self.tolerance,
+            max_expanded: self.max_cells,
+        };
+        let path = ground.path(&start, &goal, &options)?;
+        Ok(Answer::Path(Way {
+            length_m: path.length_m,
+            expanded: path.expanded,
+            centers_m: path.corners_m.into_iter().map(Into::into).collect(),
+        }))
     }
 
     fn answer(&self, questions: &Questions<impl VoxelStore>) -> CliResult<Answer> {
@@ -103,12 +155,11 @@ impl Query {
             let found = found.map(|clearance| cell(clearance.key, clearance.distance_m));
             return Ok(Answer::Clearance(found));
         }
-        let ends = self.path.as_deref().and_then(|ends| {
-            let goal = ends.get(3..).and_then(first_point)?;
-            Some((first_point(ends)?, goal))
-        });
-        let (Some((start, goal)), Some(radius_m)) = (ends, self.radius) else {
-            return Err("give --nearest, --clearance or --path with --radius".into());
+        let ends = self.path.as_deref().and_then(ends);
+        let (Some([start, goal]), Some(radius_m)) = (ends, self.radius) else {
+            return Err(
+                "give --nearest, --clearance, --ground-path, or --path with --radius".into(),
+            );
         };
         let options = PathOptions {
             radius_m,
@@ -128,6 +179,11 @@ impl Query {
 fn first_point(coordinates: &[f64]) -> Option<Vector3<f64>> {
     let point: [f64; 3] = *coordinates.first_chunk()?;
     Some(point.into())
+}
+
+fn ends(coordinates: &[f64]) -> Option<[Vector3<f64>; 2]> {
+    let goal = coordinates.get(3..).and_then(first_point)?;
+    Some([first_point(coordinates)?, goal])
 }
 
 impl Answer {

@@ -269,3 +269,43 @@ fn a_grid_is_written_as_map_server_reads_it() {
     ]);
     assert!(refused.contains("no free cell"), "{refused}");
 }
+
+/// Arguments that ask for a path on the ground of a map.
+fn ground_path<'a>(file: &'a str, goal: [&'a str; 3], rest: &[&'a str]) -> Vec<&'a str> {
+    let start = ["map", "query", file, "--ground-path", "2", "2", "0.3"];
+    [&start[..], &goal, rest].concat()
+}
+
+#[test]
+fn a_path_on_the_ground_goes_round_a_wall() {
+    let directory = tempfile::tempdir().unwrap();
+    let side = |i: u16| 0.2 * f32::from(i);
+    let floor = (0..50).flat_map(|x| (0..60).map(move |y| [side(x), side(y), 0.0]));
+    let wall = (0..30).flat_map(|y| (0..10).map(move |z| [5.0, side(y), side(z)]));
+    let points: Vec<_> = floor.chain(wall).collect();
+    let list = map(LatticeKind::Fcc, [0.0; 3], &points);
+    let file = save(directory.path(), "site", &list);
+    let goal = ["8", "2", "0.3"];
+    let way = &json(&ground_path(&file, goal, &[]))["path"];
+    let corners = way["centers_m"].as_array().unwrap();
+    let corners = corners.iter().map(|at| at.as_array().unwrap());
+    let corners: Vec<Vec<f64>> = corners
+        .map(|at| at.iter().map(|value| value.as_f64().unwrap()).collect())
+        .collect();
+    assert!((3..9).contains(&corners.len()), "{corners:?}");
+    assert!(corners.iter().any(|at| at[1] > 6.3), "{corners:?}");
+    assert!(corners.iter().all(|at| at[2].abs() < 0.05), "{corners:?}");
+    let length_m = way["length_m"].as_f64().unwrap();
+    assert!((12.0..14.5).contains(&length_m), "{length_m}");
+    let refused = error(&ground_path(&file, goal, &["--robot-radius", "3"]));
+    assert!(refused.contains("no room for a radius of 3 m"), "{refused}");
+    let refused = error(&ground_path(&file, ["80", "2", "0.3"], &[]));
+    assert!(refused.contains("goal [80.00, 2.00, 0.30]"), "{refused}");
+    let alone = ["--nearest", "1", "0", "0", "--max-step", "1"];
+    let refused = lattice(&[&["map", "query", &file], &alone[..]].concat());
+    let told = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(
+        !refused.status.success() && told.contains("--ground-path"),
+        "{told}"
+    );
+}
