@@ -29,8 +29,12 @@ pub fn of_block(
         builder.rotation = map.lattice.orientation();
     }
     let cell = map.lattice.cell();
+    let own_color = options.color_by == ColorBy::Color;
     for key in blocks.keys(block) {
         let center_m = map.center_m(key);
+        if own_color {
+            builder.color = color::of_voxel(map.color(key), options.alpha);
+        }
         let mut exposed = cell.faces.iter().filter(|face| {
             offset(key, &face.neighbor).is_none_or(|neighbor| !blocks.contains(neighbor))
         });
@@ -56,6 +60,8 @@ struct Builder<'a> {
     /// Marker orientation: viewers draw the cubes of a list along its axes.
     rotation: UnitQuaternion<f64>,
     max_points: usize,
+    /// Colour of the voxel that is being added, with [`ColorBy::Color`].
+    color: ColorRGBA,
     points: Vec<Point>,
     colors: Vec<ColorRGBA>,
     markers: Vec<Marker>,
@@ -64,7 +70,7 @@ struct Builder<'a> {
 impl<'a> Builder<'a> {
     fn new(style: MarkerStyle, options: &'a MarkerOptions, side_m: f64) -> Self {
         let point_bytes = match options.color_by {
-            ColorBy::Height => 24 + 16,
+            ColorBy::Height | ColorBy::Color => 24 + 16,
             ColorBy::Flat => 24,
         };
         let room = options.chunk_bytes.saturating_sub(2 * OVERHEAD_BYTES);
@@ -76,6 +82,7 @@ impl<'a> Builder<'a> {
             rotation: UnitQuaternion::identity(),
             // A polygon is not split: one with six corners has four triangles.
             max_points: (room / point_bytes).max(12),
+            color: color::of_voxel(None, options.alpha),
             points: Vec::new(),
             colors: Vec::new(),
             markers: Vec::new(),
@@ -111,12 +118,14 @@ impl<'a> Builder<'a> {
             y: p.y,
             z: p.z,
         });
-        if self.options.color_by == ColorBy::Height {
-            self.colors.push(self.color(at_m.z));
+        match self.options.color_by {
+            ColorBy::Height => self.colors.push(self.color_at(at_m.z)),
+            ColorBy::Color => self.colors.push(self.color.clone()),
+            ColorBy::Flat => {}
         }
     }
 
-    fn color(&self, z_m: f64) -> ColorRGBA {
+    fn color_at(&self, z_m: f64) -> ColorRGBA {
         color::of_height(z_m, self.options.height_period_m, self.options.alpha)
     }
 
@@ -139,7 +148,7 @@ impl<'a> Builder<'a> {
                 y: scale,
                 z: scale,
             },
-            color: self.color(self.origin_m.z),
+            color: self.color_at(self.origin_m.z),
             points: std::mem::take(&mut self.points),
             colors: std::mem::take(&mut self.colors),
             ..Marker::default()
