@@ -13,6 +13,8 @@ class Tile {
     this.counts = new Uint32Array(32);
     this.labels = new Uint16Array(32);
     this.seen = new Uint16Array(32);
+    // Red, green, blue and 255 from the lowest byte on, or 0; null until a cell has a colour.
+    this.colours = null;
     // Cells of each label when last packed.
     this.labelled = new Map();
   }
@@ -27,10 +29,13 @@ class Tile {
     return low;
   }
 
-  columns() { return [this.places, this.counts, this.labels, this.seen]; }
+  names() { return ["places", "counts", "labels", "seen", ...(this.colours ? ["colours"] : [])]; }
+
+  columns() { return this.names().map((name) => this[name]); }
 
   // True if the cell is new.
-  set(place, count, label, seen) {
+  set(place, count, label, seen, colour) {
+    if (colour && !this.colours) this.colours = new Uint32Array(this.places.length);
     const last = this.size === 0 || this.places[this.size - 1] < place;
     const i = last ? this.size : this.find(place);
     const fresh = last || this.places[i] !== place;
@@ -43,6 +48,7 @@ class Tile {
     this.counts[i] = count;
     this.labels[i] = label;
     this.seen[i] = seen;
+    if (this.colours) this.colours[i] = colour;
     return fresh;
   }
 
@@ -56,7 +62,7 @@ class Tile {
   }
 
   grow() {
-    for (const name of ["places", "counts", "labels", "seen"]) {
+    for (const name of this.names()) {
       const grown = new this[name].constructor(2 * this[name].length);
       grown.set(this[name]);
       this[name] = grown;
@@ -79,6 +85,8 @@ export class Follower {
     this.labelled = new Map();
     this.staging = null;
     this.renewed = false;
+    // True if any cell had a colour.
+    this.coloured = false;
     this.frame = "map";
     this.begin = Date.now();
   }
@@ -93,6 +101,7 @@ export class Follower {
       this.tiles = new Map();
       this.size = 0;
       this.labelled = new Map();
+      this.coloured = false;
       this.dirty.clear();
       this.sequence = null;
       this.staging = null;
@@ -138,8 +147,9 @@ export class Follower {
     return this.size === update.total;
   }
 
-  put({ keys, counts, labels }) {
+  put({ keys, counts, labels, colours }) {
     const seen = this.now();
+    this.coloured ||= colours?.some((colour) => colour > 0) ?? false;
     let tile = null;
     decodeKeys(keys, (id, place, i) => {
       if (!tile || tile.id !== id) {
@@ -148,7 +158,7 @@ export class Follower {
         this.dirty.add(tile);
       }
       const label = labels.length ? labels[i] : NO_LABEL;
-      if (tile.set(place, counts.length ? counts[i] : 1, label, seen)) this.size++;
+      if (tile.set(place, counts.length ? counts[i] : 1, label, seen, colours?.[i] ?? 0)) this.size++;
     });
   }
 
@@ -165,7 +175,8 @@ export class Follower {
   }
 
   // Changed tiles, packed for drawing: four 16-bit numbers per cell (position, label, logarithm of
-  // its count, second of its last change), shuffled so that any prefix is a uniform sample.
+  // its count, second of its last change), then the colours, if there are some; shuffled so that any
+  // prefix is a uniform sample.
   takeDirty(most) {
     const packed = [];
     for (const tile of this.dirty) {
@@ -230,7 +241,8 @@ export class Follower {
 
 function pack(tile) {
   const n = tile.size;
-  const cells = new Uint16Array(4 * n);
+  const cells = new Uint16Array(tile.colours ? 6 * n : 4 * n);
+  const colours = new Uint32Array(cells.buffer, 8 * n);
   let step = Math.max(1, Math.round(n * 0.618));
   while (gcd(step, n) > 1) step++;
   for (let k = 0, i = 0; k < n; k++, i = (i + step) % n) {
@@ -238,6 +250,7 @@ function pack(tile) {
     cells[4 * k + 1] = tile.labels[i];
     cells[4 * k + 2] = Math.min(65535, Math.log2(tile.counts[i] + 1) * 2048);
     cells[4 * k + 3] = tile.seen[i];
+    if (tile.colours) colours[k] = tile.colours[i];
   }
   return cells;
 }

@@ -9,7 +9,7 @@ const MOST_NAMES = 500;
 const MOST_PAINTED = 24;
 
 // Legend of a mode: a title, and ticks of a bar (positions 0 to 1) or colours with names and cell counts.
-export function legendOf({ mode, range: [low, high], span, labels, names, size, thin }) {
+export function legendOf({ mode, range: [low, high], span, labels, names, size, thin, coloured }) {
   const at = (value) => (value - low) / (high - low);
   if (mode === "count") {
     const ticks = [1, 10, 100, 2 ** high - 1].map((n) => [at(Math.log2(n + 1)), whole(Math.round(n))]);
@@ -23,6 +23,11 @@ export function legendOf({ mode, range: [low, high], span, labels, names, size, 
     const beyond = ["≤ ", "≥ "].map((sign, end) => (end ? span[1] > high + 0.01 : span[0] < low - 0.01) ? sign : "");
     const ticks = [[0, beyond[0] + metres(low)], [0.5, metres((low + high) / 2)], [1, beyond[1] + metres(high)]];
     return { title: "height in the frame of the map", mode, ticks };
+  }
+  if (mode === "colour") {
+    const note = thin ? "The thin form of the map has no colours."
+      : coloured ? "Cells without a colour are grey." : "The cells of this map have no colours: keep_color of the mapper keeps them.";
+    return { title: "mean colour of the points in a cell", note };
   }
   const title = "most frequent label of a cell";
   if (thin) return { title, note: "The thin form of the map has no labels." };

@@ -25,7 +25,7 @@ import { Writing } from "./writing.js";
 const { by } = panel;
 const ROBOT = "base_link";
 const HEADSET = "headset_origin";
-const MODES = ["height", "count", "label", "age"];
+const MODES = ["height", "count", "label", "age", "colour"];
 const QUIET_MS = 5000;
 // Timeout of a connection and of a reconnection before the page reports it, ms.
 const START_MS = 4000;
@@ -100,11 +100,11 @@ const handlers = {
     chooseColour();
     panel.showCell(null);
   },
-  tiles({ tiles, size, labels, earth, now, sequence, complete }) {
+  tiles({ tiles, size, labels, coloured, earth, now, sequence, complete }) {
     if (state.lattice) Object.assign(state.lattice, earth);
     for (const tile of tiles) cells.setTile(tile);
     cells.now = now;
-    Object.assign(state, { size, labels: new Map(labels), sequence, complete, changedAt: Date.now(), now });
+    Object.assign(state, { size, labels: new Map(labels), coloured, sequence, complete, changedAt: Date.now(), now });
     ranges();
     redraw();
   },
@@ -211,7 +211,7 @@ const legend = () => legendOf({ ...state, range: cells.colour.range, span: slice
 
 function chooseColour() {
   const { mode } = state;
-  const range = { height: state.heights, count: [1, 10], label: [0, 1], age: [0, 60] }[mode];
+  const range = { height: state.heights, count: [1, 10], label: [0, 1], age: [0, 60], colour: [0, 1] }[mode];
   cells.colour = { mode: MODES.indexOf(mode), range };
   cells.setPalette(mode);
   showLegend(legend());

@@ -18,9 +18,11 @@ function latticeInfo(r) {
 const ENCODING = "morton21_delta_leb128";
 // The counts follow the keys, as LEB128 too.
 const THIN_ENCODING = `${ENCODING}_counts_leb128`;
+// As are the numbers of coloured points; then the colours of the cells that have some.
+const COLOUR_ENCODING = `${ENCODING}_colors`;
 
 function columns(r, encoding) {
-  if (encoding !== ENCODING && encoding !== THIN_ENCODING) throw new RangeError(`keys are in ${encoding}`);
+  if (![ENCODING, THIN_ENCODING, COLOUR_ENCODING].includes(encoding)) throw new RangeError(`keys are in ${encoding}`);
   const all = {
     count: r.u32(),
     keys: r.octets(),
@@ -30,7 +32,31 @@ function columns(r, encoding) {
     labels: r.numbers(Uint16Array),
     labelCounts: r.numbers(Uint32Array),
   };
-  return encoding === THIN_ENCODING ? parted(all) : all;
+  if (encoding === THIN_ENCODING) return parted(all);
+  return encoding === COLOUR_ENCODING ? coloured(all) : all;
+}
+
+function coloured(all) {
+  const ends = [0, 0];
+  for (let part = 0, at = 0; part < 2; part++) {
+    for (let left = all.count; left > 0; at++) {
+      if (at >= all.keys.length) throw new RangeError("the colours end too early");
+      if (all.keys[at] < 128) left--;
+    }
+    ends[part] = at;
+  }
+  const counts = all.keys.subarray(ends[0], ends[1]);
+  const colours = new Uint32Array(all.count);
+  // A cell without coloured points has the number 0: one byte.
+  for (let i = 0, at = 0, k = ends[1]; i < all.count; i++) {
+    const none = counts[at] === 0;
+    while (counts[at++] > 127);
+    if (none) continue;
+    if (k + 3 > all.keys.length) throw new RangeError("the colours end too early");
+    colours[i] = (all.keys[k] | all.keys[k + 1] << 8 | all.keys[k + 2] << 16 | 255 << 24) >>> 0;
+    k += 3;
+  }
+  return { ...all, keys: all.keys.subarray(0, ends[0]), colours };
 }
 
 function parted(all) {

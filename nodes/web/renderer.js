@@ -100,6 +100,13 @@ export class CellRenderer {
       gl.bufferData(gl.ARRAY_BUFFER, tile.room, gl.DYNAMIC_DRAW);
     }
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, cells);
+    gl.bindVertexArray(tile.array);
+    // Colours follow the cells; without them each cell has the constant 0.
+    if (cells.byteLength > BYTES_A_CELL * size) {
+      gl.enableVertexAttribArray(1);
+      gl.vertexAttribPointer(1, 4, gl.UNSIGNED_BYTE, true, 0, BYTES_A_CELL * size);
+    } else gl.disableVertexAttribArray(1);
+    gl.bindVertexArray(null);
     tile.size = size;
     tile.heights = heights.map((height) => height + this.lattice.datum[2]);
   }
@@ -132,6 +139,7 @@ export class CellRenderer {
   use({ made, at }, view) {
     const { gl, lattice } = this;
     gl.useProgram(made);
+    gl.vertexAttrib4f(1, 0, 0, 0, 0);
     const cell = lattice.basis.flat();
     gl.uniformMatrix3fv(at.u_basis, false, cell);
     gl.uniformMatrix4fv(at.u_clip, false, view.clip);

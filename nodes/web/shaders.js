@@ -3,7 +3,7 @@
 // Cell colours, common to both renderings.
 const COLOUR = `
 uniform sampler2D u_palette;
-uniform int u_colour;        // 0 height, 1 count, 2 label, 3 age
+uniform int u_colour;        // 0 height, 1 count, 2 label, 3 age, 4 colour
 uniform vec2 u_range;        // values of the palette's ends
 uniform float u_now;         // seconds
 uniform float u_grey;        // 1: what is shown is old
@@ -13,7 +13,8 @@ uniform float u_tile_number;
 vec3 colour(uvec4 cell, float height) {
   if (u_chosen.x == u_tile_number && u_chosen.y == float(cell.x)) return vec3(1.0, 0.93, 0.55);
   vec3 shade;
-  if (u_colour == 2) {
+  if (u_colour == 4) shade = mix(vec3(0.45), a_colour.rgb, a_colour.a);
+  else if (u_colour == 2) {
     if (cell.y == 65535u) shade = vec3(0.45);
     else {
       float hue = fract(float(cell.y) * 0.61803399) * 6.0;
@@ -30,6 +31,7 @@ vec3 colour(uvec4 cell, float height) {
 
 const PLACE = `
 layout(location = 0) in uvec4 a_cell;
+layout(location = 1) in vec4 a_colour;   // mean colour, alpha 0 without
 uniform mat3 u_basis;        // basis of the lattice in the axes of the map, m
 uniform vec3 u_tile;         // first cell of the tile, from the eye, m
 uniform vec3 u_row;          // height of the first cell, lowest and highest shown, m

@@ -184,6 +184,7 @@ function flush() {
     tiles,
     size,
     labels: [...follower.labelled],
+    coloured: follower.coloured,
     earth: { hasOrigin: follower.info?.hasOrigin, origin: follower.info?.origin },
     now: follower.now(),
     sequence: sequence === null ? null : sequence.toString(),

@@ -49,20 +49,30 @@ pub fn cloud(frame: &str, stamp_ns: i64, points: &[[f32; 3]]) -> PointCloud2 {
     }
 }
 
+/// A cloud of `x y z` in f32 and one field more, whose bytes come with each point.
+fn cloud_with<const BYTES: usize>(
+    header: Header,
+    (name, datatype): (&str, u8),
+    points: impl Iterator<Item = ([f32; 3], [u8; BYTES])>,
+) -> PointCloud2 {
+    let step = 12 + BYTES as u32;
+    let mut message = cloud("", 0, &[]);
+    for (point, value) in points {
+        let xyz = point.iter().flat_map(|v| v.to_le_bytes());
+        message.data.extend(xyz.chain(value));
+        message.width += 1;
+    }
+    message.header = header;
+    message.fields.push(field(name, 12, datatype));
+    message.point_step = step;
+    message.row_step = step * message.width;
+    message
+}
+
 /// A cloud of `x y z` in f32 and `t` in ns since the stamp.
 pub fn timed_cloud(frame: &str, stamp_ns: i64, points: &[([f32; 3], u32)]) -> PointCloud2 {
-    let mut data = Vec::new();
-    for (point, t_ns) in points {
-        data.extend(point.iter().flat_map(|v| v.to_le_bytes()));
-        data.extend(t_ns.to_le_bytes());
-    }
-    let mut message = cloud(frame, stamp_ns, &[]);
-    message.fields.push(field("t", 12, PointField::UINT32));
-    message.width = points.len() as u32;
-    message.point_step = 16;
-    message.row_step = 16 * message.width;
-    message.data = ByteBuf::from(data);
-    message
+    let points = points.iter().map(|(xyz, t_ns)| (*xyz, t_ns.to_le_bytes()));
+    cloud_with(header(frame, stamp_ns), ("t", PointField::UINT32), points)
 }
 
 /// Points of a cloud of `x y z` in f32, as the nodes publish them.
@@ -105,18 +115,26 @@ pub fn odometry(stamp_ns: i64, map_from_base: &Isometry3<f64>) -> Odometry {
     message
 }
 
+/// A cloud of `x y z` in f32 and `rgb` as PCL packs it; alpha is 0.
+pub fn colored_cloud(frame: &str, stamp_ns: i64, points: &[([f32; 3], [u8; 3])]) -> PointCloud2 {
+    let points = points
+        .iter()
+        .map(|(xyz, [r, g, b])| (*xyz, [*b, *g, *r, 0]));
+    cloud_with(
+        header(frame, stamp_ns),
+        ("rgb", PointField::FLOAT32),
+        points,
+    )
+}
+
 /// A cloud of `x y z` in f32 and `label` in u16.
 pub fn labelled_cloud(frame: &str, stamp_ns: i64, points: &[([f32; 3], u16)]) -> PointCloud2 {
-    let mut data = Vec::new();
-    for (point, label) in points {
-        data.extend(point.iter().flat_map(|v| v.to_le_bytes()));
-        data.extend(label.to_le_bytes());
-    }
-    let mut message = cloud(frame, stamp_ns, &[]);
-    message.fields.push(field("label", 12, PointField::UINT16));
-    message.width = points.len() as u32;
-    message.point_step = 14;
-    message.row_step = 14 * message.width;
-    message.data = ByteBuf::from(data);
-    message
+    let points = points
+        .iter()
+        .map(|(xyz, label)| (*xyz, label.to_le_bytes()));
+    cloud_with(
+        header(frame, stamp_ns),
+        ("label", PointField::UINT16),
+        points,
+    )
 }

@@ -92,6 +92,7 @@ fn head_of(schema: &Schema, cells: &Cells, batches: &[RecordBatch]) -> PyResult<
         voxels: has("count").then(Vec::new),
         stamps: has("first_ns").then(Vec::new),
         labels: has("labels").then(Vec::new),
+        colors: None,
         statistics: DistortionSums::default(),
     };
     let (mut head, counted) = match (schema.metadata().get(HEAD), &cells.lattice) {

@@ -122,6 +122,8 @@ fn head_of(map: &MapColumns) -> PyResult<String> {
         voxels: map.voxels.is_some().then(Vec::new),
         stamps: map.stamps.is_some().then(Vec::new),
         labels: map.labels.is_some().then(Vec::new),
+        // Tables have no colours.
+        colors: None,
         statistics: map.statistics,
     };
     let mut bytes = Vec::new();

@@ -1,7 +1,7 @@
-//! Columns of points besides their coordinates: labels and stamps.
+//! Columns of points besides their coordinates: labels, stamps and colours.
 
 use lattice_core::registration::UNLABELED;
-use numpy::PyReadonlyArray1;
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::errors::{mistyped, refuse};
@@ -45,6 +45,35 @@ pub fn stamps(array: &Bound<'_, PyAny>, count: usize) -> PyResult<StampColumn> {
         Some(&stamp_ns) if is_one => StampColumn::All(stamp_ns),
         _ => StampColumn::Each(values),
     })
+}
+
+/// Converts red, green and blue as bytes, one row per point.
+pub fn colors(array: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<Option<[u8; 3]>>> {
+    let wrong = |found: String| {
+        refuse(format!(
+            "colors: {found}, expected uint8 of shape ({count}, 3), 0 to 255, not masked"
+        ))
+    };
+    if mask_of(array)?.is_some() {
+        return Err(wrong("they are masked".to_owned()));
+    }
+    let array = array
+        .py()
+        .import("numpy")?
+        .call_method1("ascontiguousarray", (array,))?;
+    let shape = shape_of(&array)?;
+    let bytes: PyReadonlyArray2<u8> = (array.extract())
+        .map_err(|_| wrong(format!("they are {} of shape {shape:?}", dtype_of(&array))))?;
+    if shape != [count, 3] {
+        return Err(wrong(format!("they have shape {shape:?}")));
+    }
+    let values = bytes.as_slice().map_err(refuse)?;
+    Ok(values.as_chunks().0.iter().copied().map(Some).collect())
+}
+
+fn dtype_of(array: &Bound<'_, PyAny>) -> String {
+    let name = array.getattr("dtype").map(|dtype| dtype.to_string());
+    name.unwrap_or_default()
 }
 
 /// Selects the rows of `keep`.

@@ -6,7 +6,9 @@ use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::columns::{StampColumn, kept, labels as labels_of, stamps as stamps_of};
+use crate::columns::{
+    StampColumn, colors as colors_of, kept, labels as labels_of, stamps as stamps_of,
+};
 use crate::errors::refuse;
 use crate::points::{Points, Rows, mask_of, part, warn_of_rounding};
 use crate::shared_list::SharedList;
@@ -14,16 +16,17 @@ use crate::threads::on_pool;
 
 /// Points between two checks for signals, well below half a second.
 const STEP: usize = 1 << 18;
-/// The same with labels or stamps, which one thread inserts.
+/// The same with labels, stamps or colours, which one thread inserts.
 const STEP_OF_COLUMNS: usize = 1 << 16;
 
-/// Inserts points with their labels and stamps; rows with a masked value are dropped and counted.
+/// Inserts points with their labels, stamps and colours; rows with a masked value are dropped and counted.
 pub fn insert<'py>(
     py: Python<'py>,
     list: &SharedList,
     xyz: &Bound<'py, PyAny>,
     labels: Option<&Bound<'py, PyAny>>,
     stamps: Option<&Bound<'py, PyAny>>,
+    colors: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (payload, side_m) = list.read(py, |list| (list.payload(), list.lattice().cell_side_m()))?;
     if labels.is_some() && !payload.labels {
@@ -35,10 +38,19 @@ pub fn insert<'py>(
     if stamps.is_none() && payload.stamps {
         return Err(refuse("this map keeps stamps: give stamps="));
     }
+    if colors.is_some() && !payload.color {
+        return Err(refuse(
+            "this map keeps no colours: make it with colors=True",
+        ));
+    }
     let mut points = Points::unmasked(xyz)?;
     let count = points.rows()?.len();
     let mut label_column = match labels {
         Some(array) => labels_of(array, count)?,
+        None => Vec::new(),
+    };
+    let mut color_column = match colors {
+        Some(array) => colors_of(array, count)?,
         None => Vec::new(),
     };
     let mut stamp_column = match stamps {
@@ -51,6 +63,7 @@ pub fn insert<'py>(
         let data = py.import("numpy")?.call_method1("asarray", (xyz,))?;
         points = Points::unmasked(&data.get_item(&keep)?)?;
         label_column = kept(&label_column, flags);
+        color_column = kept(&color_column, flags);
         if let StampColumn::Each(stamps) = &mut stamp_column {
             *stamps = kept(stamps, flags);
         }
@@ -71,6 +84,7 @@ pub fn insert<'py>(
             stamp_ns,
             stamps_ns: part(stamps_ns, start, step),
             labels: part(&label_column, start, step),
+            colors: part(&color_column, start, step),
         };
         let here = rows.part(start, step);
         let zero = Vector3::zeros();

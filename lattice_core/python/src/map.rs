@@ -22,7 +22,7 @@ use crate::{insert, map_arrays, map_files, query};
 /// Bound of the datum coordinates, m: offsets of 2^-20 m from it are exact in double precision.
 const MAX_DATUM_M: f64 = (1_u64 << 31) as f64;
 
-/// Occupied voxels of a lattice: counts, mean offsets and optional stamps and labels.
+/// Occupied voxels of a lattice: counts, mean offsets and optional stamps, labels and colours.
 #[pyclass(frozen, module = "lattice_core")]
 pub struct VoxelMap {
     pub list: SharedList,
@@ -34,35 +34,39 @@ pub struct VoxelMap {
 impl VoxelMap {
     /// Creates an empty map; its cells count from the one at `datum` (m).
     #[new]
-    #[pyo3(signature = (lattice, datum=[0.0; 3], *, labels=false, stamps=false, max_voxels=usize::MAX))]
+    #[pyo3(signature = (lattice, datum=[0.0; 3], *, labels=false, stamps=false, colors=false, max_voxels=usize::MAX))]
     fn new(
         lattice: &Lattice,
         datum: [f64; 3],
         labels: bool,
         stamps: bool,
+        colors: bool,
         max_voxels: usize,
     ) -> PyResult<Self> {
         if datum.iter().any(|metres| metres.abs() >= MAX_DATUM_M) {
             return Err(refuse(format!("datum {datum:?} m is not within 2^31 m")));
         }
         let list = VoxelList::new(lattice.core.clone(), datum.into(), max_voxels);
-        let list = list
-            .map_err(refuse)?
-            .with_payload(Payload { stamps, labels });
+        let list = list.map_err(refuse)?.with_payload(Payload {
+            stamps,
+            labels,
+            color: colors,
+        });
         Ok(Self::of(list))
     }
 
-    /// Adds points (m), with one label per point and a stamp per point or for all; returns the counts of the
+    /// Adds points (m), with one label and colour per point and a stamp per point or for all; returns the counts of the
     /// outcomes.
-    #[pyo3(signature = (xyz, labels=None, stamps=None))]
+    #[pyo3(signature = (xyz, labels=None, stamps=None, colors=None))]
     fn insert<'py>(
         &self,
         py: Python<'py>,
         xyz: &Bound<'py, PyAny>,
         labels: Option<&Bound<'py, PyAny>>,
         stamps: Option<&Bound<'py, PyAny>>,
+        colors: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        insert::insert(py, &self.list, xyz, labels, stamps)
+        insert::insert(py, &self.list, xyz, labels, stamps, colors)
     }
 
     /// Adds all voxels of another map of the same cells, exactly.
@@ -184,6 +188,16 @@ impl VoxelMap {
     /// Stamps of the first and the last point of each occupied cell, datetime64[ns] of shape (n, 2); NaT without stamps.
     fn stamps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         map_arrays::stamps(py, &self.list)
+    }
+
+    /// Mean red, green and blue of the coloured points of each occupied cell, uint8 of shape (n, 3); 0 without them.
+    fn colors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        map_arrays::colors(py, &self.list)
+    }
+
+    /// Number of coloured points in each occupied cell, uint32 of shape (n,).
+    fn color_counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        map_arrays::color_counts(py, &self.list)
     }
 
     /// Lattice of the cells.

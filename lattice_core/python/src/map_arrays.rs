@@ -3,7 +3,7 @@
 use lattice_core::lattice::MortonKey;
 use lattice_core::registration::UNLABELED;
 use lattice_core::voxels::file::{MapColumns, MapContents};
-use lattice_core::voxels::{DistortionSums, LabelCount, Stamps};
+use lattice_core::voxels::{ColorSum, DistortionSums, LabelCount, Stamps};
 use nalgebra::Vector3;
 use numpy::{Ix1, Ix2};
 use pyo3::prelude::*;
@@ -73,6 +73,33 @@ pub fn labels<'py>(py: Python<'py>, list: &SharedList) -> PyResult<Bound<'py, Py
         Ok(labels.iter().map(most).collect::<Vec<_>>())
     })?;
     array_of::<i32, Ix1>(py, &[labels.len()], &labels)
+}
+
+/// Mean colours of each cell; 0 without coloured points.
+pub fn colors<'py>(py: Python<'py>, list: &SharedList) -> PyResult<Bound<'py, PyAny>> {
+    let colors = of_map(py, list, |map| {
+        let mean = |color: &ColorSum| color.mean().unwrap_or_default();
+        Ok(color_sums(map)?.iter().map(mean).collect::<Vec<_>>())
+    })?;
+    array_of::<u8, Ix2>(py, &[colors.len(), 3], colors.as_flattened())
+}
+
+/// Number of coloured points of each cell.
+pub fn color_counts<'py>(py: Python<'py>, list: &SharedList) -> PyResult<Bound<'py, PyAny>> {
+    let counts = of_map(py, list, |map| {
+        Ok(color_sums(map)?
+            .iter()
+            .map(|color| color.count)
+            .collect::<Vec<_>>())
+    })?;
+    array_of::<u32, Ix1>(py, &[counts.len()], &counts)
+}
+
+fn color_sums(map: MapContents) -> PyResult<Vec<ColorSum>> {
+    let columns = MapColumns::from(map);
+    columns
+        .colors
+        .ok_or_else(|| refuse("this map keeps no colours: maps made with colors=True do"))
 }
 
 /// Stamps of the first and the last point of each cell; NaT without one.

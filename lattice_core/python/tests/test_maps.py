@@ -94,6 +94,33 @@ def test_columns_are_arrays_in_the_order_of_the_cells(cloud, map):
     assert unlabelled.labels().tolist() == [-1]
 
 
+def test_colours_are_means_of_the_cells_and_stay_in_files(cloud, tmp_path):
+    colors = np.random.default_rng(8).integers(0, 256, (len(cloud), 3), dtype=np.uint8)
+    map = VoxelMap(Lattice("fcc", 1.0), (5.0, 6.0, 7.0), colors=True)
+    map.insert(cloud, colors=colors)
+    rows = {tuple(cell): row for row, cell in enumerate(map.cells().tolist())}
+    of_point = np.array([rows[tuple(cell)] for cell in map.lattice.quantize(cloud.astype(np.float64)).tolist()])
+    count = np.bincount(of_point, minlength=len(map))
+    assert map.colors().dtype == np.uint8 and map.colors().shape == (len(map), 3)
+    for channel in range(3):
+        mean = np.bincount(of_point, colors[:, channel], len(map)) / count
+        assert np.abs(map.colors()[:, channel] - mean).max() <= 0.5
+    np.testing.assert_array_equal(map.color_counts(), count)
+    map.save(tmp_path / "map.lattice")
+    assert VoxelMap.load(tmp_path / "map.lattice") == map
+    twice = copy.copy(map)
+    twice.merge(map)
+    np.testing.assert_array_equal(twice.colors(), map.colors())
+    np.testing.assert_array_equal(twice.color_counts(), 2 * count)
+    for wrong in [colors[:-1], colors.astype(float), colors[:, :2]]:
+        with pytest.raises(ValueError, match="uint8 of shape"):
+            map.insert(cloud, colors=wrong)
+    with pytest.raises(ValueError, match="colors=True"):
+        VoxelMap(map.lattice).colors()
+    with pytest.raises(ValueError, match="colors=True"):
+        VoxelMap(map.lattice).insert(cloud, colors=colors)
+
+
 def test_a_crop_has_the_cells_with_centers_in_the_box(map):
     low, high = (-5, -3, 0), (9, 4, 2)
     part = map.crop(low, high)

@@ -21,6 +21,9 @@ pub enum CodecError {
     /// Key that repeats or reaches 2^63.
     #[error("key {index}, before byte {position}, does not ascend or is not below 2^63")]
     Key { index: usize, position: usize },
+    /// Count that does not fit 32 bits.
+    #[error("count {value}, before byte {position}, is above 4294967295")]
+    Count { value: u64, position: usize },
     /// More keys than allowed.
     #[error("more than {max} keys")]
     TooMany { max: usize },
@@ -44,6 +47,31 @@ pub fn encode_counts(counts: &[u32]) -> Vec<u8> {
         push_varint(&mut bytes, u64::from(*count));
     }
     bytes
+}
+
+/// Splits bytes after the first `len` LEB128 numbers, which are not validated.
+pub fn split_numbers(bytes: &[u8], len: usize) -> Result<(&[u8], &[u8]), CodecError> {
+    let ends = bytes.iter().enumerate().filter(|(_, byte)| **byte < 0x80);
+    let end = match len.checked_sub(1) {
+        Some(last) => ends.map(|(at, _)| at + 1).nth(last),
+        None => Some(0),
+    };
+    let position = bytes.len();
+    end.and_then(|end| bytes.split_at_checked(end))
+        .ok_or(CodecError::Truncated { position })
+}
+
+/// Decodes the first `len` numbers as counts; returns them and the bytes after them. Allocates in proportion to the
+/// input.
+pub fn decode_counts(bytes: &[u8], len: usize) -> Result<(Vec<u32>, &[u8]), CodecError> {
+    let (numbers, rest) = split_numbers(bytes, len)?;
+    let mut values = Varints::new(numbers);
+    let mut counts = Vec::with_capacity(len.min(numbers.len()));
+    while let Some(value) = values.next_value()? {
+        let position = values.position();
+        counts.push(u32::try_from(value).map_err(|_| CodecError::Count { value, position })?);
+    }
+    Ok((counts, rest))
 }
 
 /// Decodes at most `max` strictly ascending keys; allocates in proportion to the input.

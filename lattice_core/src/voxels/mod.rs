@@ -22,6 +22,7 @@ pub use distortion::{Distortion, DistortionSums};
 pub use list::{Changes, DatumError, InsertReport, NoStamps, PointColumns, VoxelList, WhenFull};
 pub use occupancy::OccupancyList;
 pub use region::{Region, RegionError};
+pub use store::color_sum::ColorSum;
 pub use store::payload_columns::{LabelCount, Payload, Stamps};
 pub use voxel::{OFFSET_UNIT_M, Voxel};
 pub use voxel_store::VoxelStore;

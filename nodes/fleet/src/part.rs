@@ -143,6 +143,8 @@ impl MapInfo {
             voxels: self.counts.then(Vec::new),
             stamps: self.stamps.then(Vec::new),
             labels: self.labels.then(Vec::new),
+            // Tables have no colours.
+            colors: None,
             statistics: DistortionSums {
                 points: sums.points,
                 squares: wide(&sums.squares)?,

@@ -6,5 +6,6 @@ pub mod corrections;
 pub mod geometry;
 pub mod headset_mesh;
 pub mod map;
+pub mod point_colors;
 pub mod semantic;
 pub mod viewpoint;

@@ -73,8 +73,17 @@ const MAX_SPAN_S: f64 = 60.0;
 /// Limit of fields passed through.
 const MAX_PASS_FIELDS: usize = 64;
 
-/// Default fields passed through: labels and their probabilities.
-const LABEL_FIELDS: [&str; 3] = ["label", "confidence", "label_probs"];
+/// Default fields passed through: labels with their probabilities, and colours.
+const PASS_FIELDS: [&str; 8] = [
+    "label",
+    "confidence",
+    "label_probs",
+    "rgb",
+    "rgba",
+    "r",
+    "g",
+    "b",
+];
 
 impl TransformerOptions {
     /// Defaults for a source: `map`, `base_link`, no range limits.
@@ -115,7 +124,7 @@ impl TransformerOptions {
             max_waiting_clouds: 512,
             max_waiting_bytes: 256 << 20,
             precision: None,
-            pass_fields: LABEL_FIELDS.map(str::to_owned).into(),
+            pass_fields: PASS_FIELDS.map(str::to_owned).into(),
             viewpoints: false,
             correction: None,
         }
@@ -177,7 +186,7 @@ impl TransformerOptions {
             ("float64", Some(double)),
         ];
         options.precision = one_of(params, "precision", &precisions)?;
-        options.pass_fields = params.string_array("pass_fields", &LABEL_FIELDS)?;
+        options.pass_fields = params.string_array("pass_fields", &PASS_FIELDS)?;
         if options.pass_fields.len() > MAX_PASS_FIELDS {
             let problem = format!("expected at most {MAX_PASS_FIELDS} names");
             return Err(params.invalid("pass_fields", problem));

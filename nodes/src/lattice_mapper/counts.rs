@@ -19,6 +19,9 @@ pub struct MapperCounts {
     /// Clouds mapped without labels, where labels are kept.
     #[serde(default)]
     pub clouds_unlabelled: u64,
+    /// Clouds mapped without colours, where colours are kept.
+    #[serde(default)]
+    pub clouds_uncolored: u64,
     /// Points of mapped clouds.
     pub points_in: u64,
     /// Points in the map.

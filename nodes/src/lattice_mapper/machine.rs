@@ -1,13 +1,13 @@
 //! Input of the mapper: clouds, their labels and rays.
 
 use lattice_core::cloud::{Cloud, CloudLimits};
-use lattice_core::voxels::VoxelStore;
+use lattice_core::voxels::{PointColumns, VoxelStore};
 use lattice_msgs::sensor_msgs::PointCloud2;
 use nalgebra::Vector3;
 
 use super::refusal::CloudRefusal;
 use super::state::LatticeMapper;
-use crate::convert::{cloud, semantic, viewpoint};
+use crate::convert::{cloud, point_colors, semantic, viewpoint};
 
 impl LatticeMapper {
     /// Quantizes a cloud of the map frame into the list.
@@ -29,6 +29,7 @@ impl LatticeMapper {
         self.choose_datum(&cloud);
         // Everything that can be rejected is read before any voxel changes.
         let labels = self.labels_of(message)?;
+        let colors = self.colors_of(message, &limits)?;
         let viewpoints = self.viewpoints_of(message, &limits)?;
         // The first stamp has no reference: nothing expires by it.
         let ages = (self.stamps.as_ref()).is_some_and(|stamps| !stamps.is_new());
@@ -43,10 +44,17 @@ impl LatticeMapper {
         if (self.free_space.as_ref()).is_some_and(|free| free.is_complete(cloud.stamp_ns)) {
             self.clear_rays();
         }
-        let report = match (&mut self.occupancy, labels) {
-            (Some(occupancy), _) => occupancy.insert(&cloud),
-            (None, None) => self.list.insert(&cloud),
-            (None, Some(labels)) => self.list.insert_labelled(&cloud, &labels),
+        let report = match &mut self.occupancy {
+            Some(occupancy) => occupancy.insert(&cloud),
+            None => {
+                let columns = PointColumns {
+                    stamp_ns,
+                    labels: &labels.unwrap_or_default(),
+                    colors: &colors.unwrap_or_default(),
+                    ..PointColumns::default()
+                };
+                (self.list).insert_points(cloud.datum_m, &cloud.offsets_m, columns)
+            }
         };
         self.counts.add(&report);
         self.last_stamp_ns = cloud.stamp_ns;
@@ -69,6 +77,21 @@ impl LatticeMapper {
             .inspect_err(|_| self.counts.clouds_malformed += 1)?;
         self.counts.clouds_unlabelled += u64::from(labels.is_none());
         Ok(Some(labels.unwrap_or_default()))
+    }
+
+    /// Colours of the points; `None` if they are not kept or the cloud has none.
+    fn colors_of(
+        &mut self,
+        message: &PointCloud2,
+        limits: &CloudLimits,
+    ) -> Result<Option<Vec<Option<[u8; 3]>>>, CloudRefusal> {
+        if !self.list.payload().color {
+            return Ok(None);
+        }
+        let colors = point_colors::colors_from_message(message, limits)
+            .inspect_err(|_| self.counts.clouds_malformed += 1)?;
+        self.counts.clouds_uncolored += u64::from(colors.is_none());
+        Ok(colors)
     }
 
     /// Viewpoint of each point; `None` if free space is off or the cloud has none.

@@ -30,8 +30,8 @@ impl LatticeMapper {
         messages
     }
 
-    /// Cell centres in the map frame, with the number of points (1 if not kept) as `intensity` and,
-    /// if labels are kept, the most frequent one as `label`.
+    /// Cell centres in the map frame, with the number of points (1 if not kept) as `intensity`, the most frequent label as
+    /// `label` if labels are kept, and the mean colour as `rgb` if colours are kept: black where no point has one.
     pub fn centers(&self) -> PointCloud2 {
         let voxels: Vec<(MortonKey, u32)> = match &self.occupancy {
             Some(cells) => (cells.sorted_keys().into_iter())
@@ -41,11 +41,15 @@ impl LatticeMapper {
                 .map(|(key, voxel)| (key, voxel.count))
                 .collect(),
         };
-        let labelled = self.list.payload().labels;
+        let kept = self.list.payload();
         let mut fields = cloud::xyz_fields(PointField::FLOAT32, 4);
         fields.push(cloud::field("intensity", 12, PointField::FLOAT32));
-        if labelled {
+        if kept.labels {
             fields.push(cloud::field("label", 16, PointField::UINT16));
+        }
+        if kept.color {
+            let offset = 4 * fields.len() as u32;
+            fields.push(cloud::field("rgb", offset, PointField::FLOAT32));
         }
         let point_step = 4 * fields.len() as u32;
         let mut data = Vec::with_capacity(voxels.len() * point_step as usize);
@@ -54,10 +58,16 @@ impl LatticeMapper {
             for v in [center.x, center.y, center.z, f64::from(*count)] {
                 data.extend_from_slice(&(v as f32).to_le_bytes());
             }
-            if labelled {
+            if kept.labels {
                 let (label, _) = map::main_label(&self.list, *key);
                 // Padded to four bytes.
                 data.extend_from_slice(&u32::from(label).to_le_bytes());
+            }
+            if kept.color {
+                let color = map::VoxelColor::of_cell(&self.list, *key);
+                let [r, g, b] = color.map_or([0; 3], |color| color.rgb);
+                // As PCL packs it.
+                data.extend_from_slice(&[b, g, r, 0]);
             }
         }
         cloud::dense_cloud(self.header(), fields, point_step, voxels.len(), data)

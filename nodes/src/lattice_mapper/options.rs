@@ -34,6 +34,8 @@ pub struct MapperOptions {
     pub max_cloud_points: usize,
     /// Label conversion for label counts in each voxel; `None`: labels are not kept.
     pub labels: Option<LabelOptions>,
+    /// True if colours are summed in each voxel.
+    pub keep_color: bool,
     /// Largest serialized message of `voxel_map`, `voxel_map_updates` and `free`, bytes.
     pub chunk_bytes: usize,
     /// Payload of a voxel: one bit, or count and mean point.
@@ -82,6 +84,7 @@ impl MapperOptions {
             forget_after_ns: 0,
             max_cloud_points: 4_000_000,
             labels: None,
+            keep_color: false,
             chunk_bytes: 60_000,
             payload: MapPayload::Centroid,
             free_space: MappedFreeSpace::default(),
@@ -110,15 +113,15 @@ impl MapperOptions {
             forget_after_ns: forget_after_ns(params)?,
             max_cloud_points: params.positive("max_cloud_points", defaults.max_cloud_points)?,
             labels: Self::labels_from(params)?,
+            keep_color: params.bool("keep_color", false)?,
             chunk_bytes: options::chunk_bytes(params, defaults.chunk_bytes)?,
             payload: options::one_of(params, "payload", &PAYLOADS)?,
             free_space: MappedFreeSpace::from_params(params)?,
             ..defaults
         };
-        let has_columns = read.payload().stamps || read.payload().labels;
-        if read.payload == MapPayload::Occupancy && has_columns {
-            let problem = "occupancy has neither stamps nor labels: needs centroid with \
-                           forget_after_s or keep_labels";
+        if read.payload == MapPayload::Occupancy && !read.payload().is_plain() {
+            let problem = "occupancy has no stamps, labels or colours: needs centroid with \
+                           forget_after_s, keep_labels or keep_color";
             return Err(params.invalid("payload", problem));
         }
         if read.payload == MapPayload::Occupancy && read.when_full != WhenFull::Refuse {
@@ -156,6 +159,7 @@ impl MapperOptions {
         Payload {
             stamps: self.forget_after_ns > 0,
             labels: self.labels.is_some(),
+            color: self.keep_color,
         }
     }
 

@@ -40,6 +40,7 @@ const ABOUT: &[About] = about! {
     "when_full": "Policy for a full map: refuse (points in new cells are rejected and counted) or forget_oldest (an eighth of the voxels is removed, those without points for longest).";
     "forget_after_s": "Age limit of voxels since their last point, by the stamps of the clouds; 0: none, not settable at run time. Costs 16 bytes a voxel and insertion time. Clouds whose stamps jump by more than half of it, and a second, are rejected and counted until five in a row agree on the new time.";
     "keep_labels" fixed(MAP): "Whether labels are counted in each voxel: voxel_map, voxel_map_updates and map_centers then contain the most frequent one. Costs 24 bytes a voxel, 8 for each of its labels, and insertion time.";
+    "keep_color" fixed(MAP): "Whether colours of points (rgb, rgba or r, g, b) are summed in each voxel: voxel_map, voxel_map_updates, map_centers and map files then contain the mean. Programs from before it do not read such messages. Costs 20 bytes a voxel and insertion time.";
     "chunk_bytes": "Largest message of voxel_map and voxel_map_updates, bytes. Above 60 kB reliable messages are fragmented, and repair is slow.";
     "centers_period_s": "Period of map_centers, octomap_binary and octomap_full.";
     "free_period_s": "Period of free.";

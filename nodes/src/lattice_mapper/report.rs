@@ -66,7 +66,7 @@ impl MapperReport {
         let content = || {
             let keys = cells.sorted_keys();
             let (list, checksum) = match &mapper.occupancy {
-                Some(_) => (None, map::changes_sum(&[], &keys)),
+                Some(_) => (None, map::changes_sum(&map::Decoded::default(), &keys)),
                 None => (Some(mapper.list()), mapper.list().checksum()),
             };
             (map::voxel_bytes(&keys, list), checksum)

@@ -9,6 +9,9 @@ use super::report::MapperReport;
 use crate::report;
 use lattice_runtime::{Level, WORKING};
 
+const NO_COLORS: &str = "no cloud has colours (`keep_color`): they need a field rgb, rgba or r, g, b, which \
+                         `pass_fields` of enu_transformer passes on";
+
 impl ComputeState {
     pub(super) fn report(&mut self) -> MapperReport {
         MapperReport {
@@ -54,6 +57,10 @@ impl ComputeState {
         } else if counts.clouds_no_viewpoint > 0 {
             let clouds = counts.clouds_no_viewpoint;
             (Level::Warn, format!("{clouds} clouds: {NO_VIEWPOINTS}"))
+        } else if counts.clouds_uncolored > 0
+            && counts.clouds_uncolored + refused >= counts.clouds_in
+        {
+            (Level::Warn, NO_COLORS.to_owned())
         } else if counts.ray_blocks_refused > 0 {
             let problem =
                 "the memory for rays is full (`rays.max_bytes`): not all voxels are cleared";

@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use rustc_hash::{FxBuildHasher, FxHashMap};
 
 use super::FollowError;
-use crate::convert::map::{self, MapMessageError, VoxelState};
+use crate::convert::map::{self, Decoded, MapMessageError, VoxelColor, VoxelState};
 use crate::hurry::{CELLS_BETWEEN_LOOKS, Hurry};
 
 /// Lattice and voxels of a followed map.
@@ -27,13 +27,14 @@ pub struct FollowedMap {
     /// Unit of mean offsets, in metres.
     pub offset_unit_m: f64,
     voxels: FxHashMap<MortonKey, VoxelState>,
+    colors: FxHashMap<MortonKey, VoxelColor>,
 }
 
 /// Decoded content of one update chunk.
 pub(super) struct Changes {
     pub sequence: u64,
     stamp_ns: i64,
-    voxels: Vec<(MortonKey, VoxelState)>,
+    changed: Decoded,
     removed: Vec<MortonKey>,
     /// Sum for the checksum.
     pub sum: u64,
@@ -41,20 +42,20 @@ pub(super) struct Changes {
 
 impl Changes {
     pub fn of(message: &LatticeMapUpdate, max_voxels: usize) -> Result<Self, MapMessageError> {
-        let voxels = map::voxels_from(message.into(), max_voxels)?;
+        let changed = map::voxels_from(message.into(), max_voxels)?;
         let removed = map::keys_from(&message.key_encoding, &message.removed_keys, max_voxels)?;
         Ok(Self {
             sequence: message.sequence,
             stamp_ns: message.header.stamp.to_ns(),
-            sum: map::changes_sum(&voxels, &removed),
-            voxels,
+            sum: map::changes_sum(&changed, &removed),
+            changed,
             removed,
         })
     }
 
     /// Number of changed and removed voxels.
     pub fn len(&self) -> usize {
-        self.voxels.len() + self.removed.len()
+        self.changed.voxels.len() + self.removed.len()
     }
 }
 
@@ -70,12 +71,23 @@ impl FollowedMap {
             stamp_ns: 0,
             offset_unit_m,
             voxels: FxHashMap::default(),
+            colors: FxHashMap::default(),
         })
     }
 
     /// Voxels in arbitrary order.
     pub fn voxels(&self) -> &HashMap<MortonKey, VoxelState, FxBuildHasher> {
         &self.voxels
+    }
+
+    /// Mean colour of a voxel; `None` if it has none.
+    pub fn color(&self, key: MortonKey) -> Option<VoxelColor> {
+        self.colors.get(&key).copied()
+    }
+
+    /// True if any voxel has a colour.
+    pub fn has_colors(&self) -> bool {
+        !self.colors.is_empty()
     }
 
     /// Centre of a cell in the map frame, in metres.
@@ -117,6 +129,7 @@ impl FollowedMap {
     pub(super) fn replace(
         &mut self,
         voxels: FxHashMap<MortonKey, VoxelState>,
+        colors: FxHashMap<MortonKey, VoxelColor>,
         touched: &mut Vec<MortonKey>,
         hurry: &Hurry,
     ) -> bool {
@@ -126,7 +139,10 @@ impl FollowedMap {
             .keys()
             .map(|key| (key, !voxels.contains_key(key)));
         let new = voxels.iter();
-        let new = new.map(|(key, state)| (key, self.voxels.get(key) != Some(state)));
+        let is_new = |key: &MortonKey, state: &VoxelState| {
+            self.voxels.get(key) != Some(state) || self.colors.get(key) != colors.get(key)
+        };
+        let new = new.map(|(key, state)| (key, is_new(key, state)));
         for (at, (key, is_touched)) in gone.chain(new).enumerate() {
             if at.is_multiple_of(CELLS_BETWEEN_LOOKS) && hurry.is_requested() {
                 touched.truncate(known);
@@ -136,7 +152,7 @@ impl FollowedMap {
                 touched.push(*key);
             }
         }
-        self.voxels = voxels;
+        (self.voxels, self.colors) = (voxels, colors);
         true
     }
 
@@ -147,8 +163,9 @@ impl FollowedMap {
         limit: usize,
         touched: &mut Vec<MortonKey>,
     ) -> Result<(), FollowError> {
-        if self.voxels.len() + changes.voxels.len() > limit {
-            let new = changes.voxels.iter();
+        let Decoded { voxels, colors } = &changes.changed;
+        if self.voxels.len() + voxels.len() > limit {
+            let new = voxels.iter();
             let new = new.filter(|(key, _)| !self.voxels.contains_key(key));
             let found = self.voxels.len() + new.count();
             if found > limit {
@@ -158,12 +175,20 @@ impl FollowedMap {
         }
         self.stamp_ns = changes.stamp_ns;
         for key in &changes.removed {
+            self.colors.remove(key);
             if self.voxels.remove(key).is_some() {
                 touched.push(*key);
             }
         }
-        for (key, state) in &changes.voxels {
-            if self.voxels.insert(*key, *state) != Some(*state) {
+        let mut colors = colors.iter().peekable();
+        for (key, state) in voxels {
+            let color = colors.next_if(|(colored, _)| colored == key);
+            let color = color.map(|(_, color)| *color);
+            let before = match color {
+                Some(color) => self.colors.insert(*key, color),
+                None => self.colors.remove(key),
+            };
+            if self.voxels.insert(*key, *state) != Some(*state) || before != color {
                 touched.push(*key);
             }
         }

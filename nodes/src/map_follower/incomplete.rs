@@ -6,7 +6,7 @@ use lattice_core::lattice::MortonKey;
 use rustc_hash::FxHashMap;
 
 use super::followed_map::Changes;
-use crate::convert::map::{History, VoxelState};
+use crate::convert::map::{History, VoxelColor, VoxelState};
 
 /// Limit of updates stored while a keyframe is received.
 pub(super) const MAX_WAITING_UPDATES: usize = 4096;
@@ -52,6 +52,7 @@ pub(super) struct Staging {
     pub history: History,
     pub chunks: Chunks,
     pub voxels: FxHashMap<MortonKey, VoxelState>,
+    pub colors: FxHashMap<MortonKey, VoxelColor>,
     /// Newest sequence of the map at the last received chunk.
     pub heard_at: u64,
     pub later: Vec<Changes>,
@@ -65,6 +66,7 @@ impl Staging {
             history,
             chunks: Chunks::new(chunks),
             voxels: FxHashMap::default(),
+            colors: FxHashMap::default(),
             heard_at: sequence,
             later: Vec::new(),
             later_voxels: 0,

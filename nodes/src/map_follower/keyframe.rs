@@ -1,13 +1,12 @@
 //! Keyframes: collection of their chunks, and adoption when they are complete.
 
-use lattice_core::lattice::MortonKey;
 use lattice_msgs::lattice::LatticeMap;
 
 use super::followed::{FollowError, Followed};
 use super::followed_map::FollowedMap;
 use super::follower::{MapFollower, PATIENCE_S, check_chunk};
 use super::incomplete::Staging;
-use crate::convert::map::{self, History, VoxelState};
+use crate::convert::map::{self, Decoded, History};
 
 impl MapFollower {
     /// Handles one chunk of a keyframe.
@@ -78,10 +77,11 @@ impl MapFollower {
         &mut self,
         mut staging: Staging,
         chunk: u32,
-        voxels: Vec<(MortonKey, VoxelState)>,
+        decoded: Decoded,
     ) -> Result<Followed, FollowError> {
         if staging.chunks.insert(chunk) {
-            staging.voxels.extend(voxels);
+            staging.voxels.extend(decoded.voxels);
+            staging.colors.extend(decoded.colors);
         }
         if staging.voxels.len() > self.max_voxels {
             return Err(FollowError::TooLarge {
@@ -104,7 +104,7 @@ impl MapFollower {
         let Some(map) = &mut self.map else {
             return Ok(Followed::Applied);
         };
-        if !map.replace(done.voxels, &mut self.touched, &self.hurry) {
+        if !map.replace(done.voxels, done.colors, &mut self.touched, &self.hurry) {
             return Ok(Followed::LeftOut);
         }
         self.compact_above = self.compact_above.max(2 * self.touched.len());

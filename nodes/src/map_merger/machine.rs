@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use lattice_core::lattice::MortonKey;
-use lattice_core::voxels::{LabelCount, Payload, Voxel, VoxelList};
+use lattice_core::voxels::{ColorSum, LabelCount, Payload, Voxel, VoxelList};
 use lattice_msgs::geographic_msgs::GeoPoint;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use serde::Serialize;
@@ -178,6 +178,7 @@ impl MapMerger {
             let payload = Payload {
                 labels: options.labels != MergedLabels::None,
                 stamps: false,
+                color: false,
             };
             let list = VoxelList::new(followed.lattice.clone(), options.datum_m, usize::MAX);
             self.union = list.ok().map(|list| list.with_payload(payload));
@@ -228,7 +229,9 @@ impl MapMerger {
                 });
                 let labels: Vec<_> = labels.collect();
                 let has_room = union.len() < self.options.max_voxels || union.contains(cell);
-                if !((sum.count == 0 || has_room) && union.put(cell, &sum, &labels)) {
+                if !((sum.count == 0 || has_room)
+                    && union.put(cell, &sum, &labels, ColorSum::default()))
+                {
                     self.counts.voxels_list_full += 1;
                 }
             }

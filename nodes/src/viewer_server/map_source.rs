@@ -11,7 +11,7 @@ use lattice_msgs::std_msgs::Header;
 use serde_bytes::ByteBuf;
 
 use super::broadcast::{Entry, thin};
-use crate::convert::map::{History, KEY_ENCODING, VoxelState, sign};
+use crate::convert::map::{History, keys_with_colors, plain_keys, sign};
 use crate::hurry::Hurry;
 use crate::map_follower::{FollowError, Followed, FollowedMap, MapFollower};
 
@@ -145,6 +145,8 @@ fn header(map: &FollowedMap) -> Header {
 /// Voxel columns of a message.
 #[derive(Default)]
 struct Columns {
+    keys: ByteBuf,
+    key_encoding: String,
     counts: Vec<u32>,
     mean_offsets: Vec<i16>,
     labels: Vec<u16>,
@@ -152,9 +154,17 @@ struct Columns {
 }
 
 impl Columns {
-    fn of<'a>(voxels: impl Iterator<Item = &'a VoxelState>) -> Self {
-        let mut columns = Self::default();
-        for voxel in voxels {
+    fn of(map: &FollowedMap, keys: &[MortonKey]) -> Self {
+        let (encoded, key_encoding) = match map.has_colors() {
+            true => keys_with_colors(keys, |key| map.color(key)),
+            false => plain_keys(keys),
+        };
+        let mut columns = Self {
+            keys: encoded,
+            key_encoding,
+            ..Self::default()
+        };
+        for voxel in keys.iter().filter_map(|key| map.voxels().get(key)) {
             columns.counts.push(voxel.count);
             columns.mean_offsets.extend(voxel.mean_offset);
             columns.labels.push(voxel.label);
@@ -176,7 +186,7 @@ fn keyframe(map: &FollowedMap, sequence: u64, history: History) -> Vec<LatticeMa
         false => keys.chunks(CHUNK_VOXELS).collect(),
     };
     let chunk = |(chunk, part): (u32, &&[MortonKey])| {
-        let columns = Columns::of(part.iter().filter_map(|key| map.voxels().get(key)));
+        let columns = Columns::of(map, part);
         LatticeMap {
             header: header(map),
             info: map.info.clone(),
@@ -184,9 +194,9 @@ fn keyframe(map: &FollowedMap, sequence: u64, history: History) -> Vec<LatticeMa
             chunk,
             chunks: parts.len() as u32,
             voxels_total: keys.len() as u64,
-            key_encoding: KEY_ENCODING.to_owned(),
+            key_encoding: columns.key_encoding,
             voxels: part.len() as u32,
-            keys: ByteBuf::from(codec::encode_keys(part)),
+            keys: columns.keys,
             counts: columns.counts,
             offset_unit_m: map.offset_unit_m,
             mean_offsets: columns.mean_offsets,
@@ -212,7 +222,7 @@ fn update(
         let here = |key: &&MortonKey| map.voxels().contains_key(key);
         let (changed, removed): (Vec<MortonKey>, Vec<MortonKey>) =
             part.iter().partition(|key| here(key));
-        let columns = Columns::of(changed.iter().filter_map(|key| map.voxels().get(key)));
+        let columns = Columns::of(map, &changed);
         LatticeMapUpdate {
             header: header(map),
             info: map.info.clone(),
@@ -220,9 +230,9 @@ fn update(
             sequence,
             chunk,
             chunks: parts.len() as u32,
-            key_encoding: KEY_ENCODING.to_owned(),
+            key_encoding: columns.key_encoding,
             voxels: changed.len() as u32,
-            keys: ByteBuf::from(codec::encode_keys(&changed)),
+            keys: columns.keys,
             counts: columns.counts,
             offset_unit_m: map.offset_unit_m,
             mean_offsets: columns.mean_offsets,

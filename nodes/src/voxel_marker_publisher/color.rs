@@ -1,6 +1,18 @@
-//! Colours by height.
+//! Colours by height, and of voxels.
 
 use lattice_msgs::std_msgs::ColorRGBA;
+
+use crate::convert::map::VoxelColor;
+
+/// Grey of voxels without a colour.
+const UNCOLORED: [u8; 3] = [115; 3];
+
+/// Mean colour of a voxel, grey if it has none.
+pub fn of_voxel(color: Option<VoxelColor>, alpha: f32) -> ColorRGBA {
+    let [r, g, b] = color.map_or(UNCOLORED, |color| color.rgb);
+    let [r, g, b] = [r, g, b].map(|value| f32::from(value) / 255.0);
+    ColorRGBA { r, g, b, a: alpha }
+}
 
 /// Colour of a height: hues run through once every `period_m`.
 pub fn of_height(z_m: f64, period_m: f64, alpha: f32) -> ColorRGBA {

@@ -19,6 +19,8 @@ pub enum MarkerStyle {
 pub enum ColorBy {
     /// By the height of each vertex; 16 more bytes each.
     Height,
+    /// The mean colour of each voxel, where the mapper keeps it; 16 more bytes per vertex.
+    Color,
     /// One colour per marker, by the height of its block.
     Flat,
 }
@@ -68,7 +70,11 @@ impl MarkerOptions {
             ("cubes", MarkerStyle::Cubes),
             ("points", MarkerStyle::Points),
         ];
-        let colors = [("height", ColorBy::Height), ("flat", ColorBy::Flat)];
+        let colors = [
+            ("height", ColorBy::Height),
+            ("flat", ColorBy::Flat),
+            ("color", ColorBy::Color),
+        ];
         let period_m = defaults.height_period_m;
         let block_bits = params.usize_in("block_bits", defaults.block_bits as usize, 1..=10)?;
         Ok(Self {

@@ -11,7 +11,7 @@ use lattice_runtime::qos::Qos;
 
 const ABOUT: &[About] = about! {
     "style": "Marker style: cells (Voronoi cells, exposed faces only), cubes or points.";
-    "color_by": "Colour scheme: height (of each vertex) or flat (one colour per marker, 40 % fewer bytes).";
+    "color_by": "Colour scheme: height (of each vertex), flat (one colour per marker, 40 % fewer bytes) or color (mean colour of each voxel, where the mapper has keep_color; grey without).";
     "height_period_m": "Height period of the hues.";
     "alpha": "Opacity.";
     "block_bits": "Block size: 2^block_bits lattice indices a side; a change republishes its whole block.";

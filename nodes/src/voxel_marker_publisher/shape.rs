@@ -29,6 +29,7 @@ pub fn of_block(
         builder.rotation = map.lattice.orientation();
     }
     let cell = map.lattice.cell();
+    let own_color = options.color_by == ColorBy::Color;
     let mut corners = Vec::new();
     for key in blocks.keys(block) {
         let center_m = map.center_m(key);
@@ -39,6 +40,9 @@ pub fn of_block(
             .peekable();
         if exposed.peek().is_none() {
             continue;
+        }
+        if own_color {
+            builder.color = color::of_voxel(map.color(key), options.alpha);
         }
         if style != MarkerStyle::Cells {
             builder.point(&center_m);
@@ -74,6 +78,8 @@ struct Builder<'a> {
     /// Marker orientation: viewers draw the cubes of a list along its axes.
     rotation: UnitQuaternion<f64>,
     max_points: usize,
+    /// Colour of the voxel that is being added, with [`ColorBy::Color`].
+    color: ColorRGBA,
     points: Vec<Point>,
     colors: Vec<ColorRGBA>,
     markers: Vec<Marker>,
@@ -82,7 +88,7 @@ struct Builder<'a> {
 impl<'a> Builder<'a> {
     fn new(style: MarkerStyle, options: &'a MarkerOptions, side_m: f64) -> Self {
         let point_bytes = match options.color_by {
-            ColorBy::Height => 24 + 16,
+            ColorBy::Height | ColorBy::Color => 24 + 16,
             ColorBy::Flat => 24,
         };
         let room = options.chunk_bytes.saturating_sub(2 * OVERHEAD_BYTES);
@@ -94,6 +100,7 @@ impl<'a> Builder<'a> {
             rotation: UnitQuaternion::identity(),
             // A polygon is not split: one with six corners has four triangles.
             max_points: (room / point_bytes).max(12),
+            color: color::of_voxel(None, options.alpha),
             points: Vec::new(),
             colors: Vec::new(),
             markers: Vec::new(),
@@ -133,7 +140,11 @@ impl<'a> Builder<'a> {
                 y: p.y,
                 z: p.z,
             },
-            color: (self.options.color_by == ColorBy::Height).then(|| self.color(at_m.z)),
+            color: match self.options.color_by {
+                ColorBy::Height => Some(self.color_at(at_m.z)),
+                ColorBy::Color => Some(self.color.clone()),
+                ColorBy::Flat => None,
+            },
         }
     }
 
@@ -142,7 +153,7 @@ impl<'a> Builder<'a> {
         self.colors.extend(corner.color.clone());
     }
 
-    fn color(&self, z_m: f64) -> ColorRGBA {
+    fn color_at(&self, z_m: f64) -> ColorRGBA {
         color::of_height(z_m, self.options.height_period_m, self.options.alpha)
     }
 
@@ -165,7 +176,7 @@ impl<'a> Builder<'a> {
                 y: scale,
                 z: scale,
             },
-            color: self.color(self.origin_m.z),
+            color: self.color_at(self.origin_m.z),
             points: std::mem::take(&mut self.points),
             colors: std::mem::take(&mut self.colors),
             ..Marker::default()

@@ -231,6 +231,7 @@ fn detailed_maps() -> Vec<Vec<u8>> {
         let mut list = list.with_payload(Payload {
             stamps: true,
             labels: true,
+            color: true,
         });
         for scan in 0..2 {
             let cloud = Cloud {

@@ -16,5 +16,6 @@ mod pose;
 mod query;
 mod raycast;
 mod registration_pair;
+mod voxel_colors;
 mod voxels_operations;
 mod voxels_properties;

@@ -10,7 +10,7 @@ use lattice_core::voxels::codec::decode_keys;
 use lattice_core::voxels::file::{
     MapContents, WriteOptions, max_voxels_of, read_map, read_occupancy,
 };
-use lattice_core::voxels::{OccupancyList, Payload, VoxelList, VoxelStore};
+use lattice_core::voxels::{OccupancyList, Payload, PointColumns, VoxelList, VoxelStore};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -32,8 +32,12 @@ fn any_lattice() -> impl Strategy<Value = Lattice> {
 }
 
 fn any_payload() -> impl Strategy<Value = Payload> {
-    let kept = any::<(bool, bool)>();
-    kept.prop_map(|(stamps, labels)| Payload { stamps, labels })
+    let kept = any::<(bool, bool, bool)>();
+    kept.prop_map(|(stamps, labels, color)| Payload {
+        stamps,
+        labels,
+        color,
+    })
 }
 
 fn any_map() -> impl Strategy<Value = MapContents> {
@@ -55,7 +59,16 @@ fn any_map() -> impl Strategy<Value = MapContents> {
             datum_m,
             offsets_m,
         };
-        list.insert_labelled(&cloud, &labels);
+        let colors: Vec<_> = (0..cloud.len() as u8)
+            .map(|i| (i % 4 > 0).then_some([i, 255 - i, 9]))
+            .collect();
+        let columns = PointColumns {
+            stamp_ns,
+            labels: &labels,
+            colors: &colors,
+            ..PointColumns::default()
+        };
+        list.insert_points(datum_m, &cloud.offsets_m, columns);
         cloud.offsets_m.truncate(20);
         cloud.stamp_ns = stamp_ns.wrapping_add(1 << 60);
         list.insert(&cloud);

@@ -6,7 +6,8 @@ use lattice_core::cloud::Cloud;
 use lattice_core::lattice::{Lattice, LatticeKind, MortonKey};
 use lattice_core::voxels::file::MapContents;
 use lattice_core::voxels::{
-    LabelCount, OccupancyList, Payload, Region, Stamps, Voxel, VoxelList, VoxelStore, WhenFull,
+    ColorSum, LabelCount, OccupancyList, Payload, PointColumns, Region, Stamps, Voxel, VoxelList,
+    VoxelStore, WhenFull,
 };
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -17,6 +18,7 @@ const DATUM_M: [f64; 3] = [9.0, 20.0, 31.0];
 const ALL_COLUMNS: Payload = Payload {
     stamps: true,
     labels: true,
+    color: true,
 };
 
 /// All named lattices, one turned, one of a basis of its own.
@@ -61,7 +63,17 @@ fn rich(lattice: &Lattice, offsets: &[[f32; 3]]) -> VoxelList {
     let mut list = empty(lattice, usize::MAX).with_payload(ALL_COLUMNS);
     for (stamp_ns, part) in offsets.chunks(offsets.len().div_ceil(3).max(1)).enumerate() {
         let labels: Vec<u16> = (0..part.len() as u16).map(|i| i % 3).collect();
-        list.insert_labelled(&cloud(stamp_ns as i64, part), &labels);
+        let colors: Vec<_> = (0..part.len() as u8)
+            .map(|i| (i % 4 > 0).then_some([i, 255 - i, 9]))
+            .collect();
+        let columns = PointColumns {
+            stamp_ns: stamp_ns as i64,
+            labels: &labels,
+            colors: &colors,
+            ..PointColumns::default()
+        };
+        let part = cloud(stamp_ns as i64, part);
+        list.insert_points(part.datum_m, &part.offsets_m, columns);
     }
     list
 }
@@ -76,11 +88,14 @@ fn keys(store: &dyn VoxelStore) -> BTreeSet<MortonKey> {
     store.sorted_keys().into_iter().collect()
 }
 
-type Row = (Voxel, Option<Stamps>, Vec<LabelCount>);
+type Row = (Voxel, Option<Stamps>, Vec<LabelCount>, Option<ColorSum>);
 
 /// All that is kept of each voxel.
 fn rows(list: &VoxelList) -> BTreeMap<MortonKey, Row> {
-    let row = |(key, voxel)| (key, (voxel, list.stamps(key), list.labels(key)));
+    let row = |(key, voxel)| {
+        let (stamps, labels) = (list.stamps(key), list.labels(key));
+        (key, (voxel, stamps, labels, list.color(key)))
+    };
     list.sorted().into_iter().map(row).collect()
 }
 

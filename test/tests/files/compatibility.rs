@@ -100,7 +100,11 @@ fn map(lattice: Lattice) -> VoxelList {
     let first = cloud(START_NS);
     let list = VoxelList::new(lattice, first.datum_m, MAX_VOXELS).unwrap();
     let (stamps, labels) = (true, true);
-    let mut list = list.with_payload(Payload { stamps, labels });
+    let mut list = list.with_payload(Payload {
+        stamps,
+        labels,
+        ..Payload::default()
+    });
     let labels: Vec<u16> = (0..first.offsets_m.len())
         .map(|i| (i % 3) as u16 * 7)
         .collect();

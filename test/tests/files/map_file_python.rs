@@ -70,6 +70,7 @@ fn maps() -> Vec<MapContents> {
         let mut list = list.with_payload(Payload {
             stamps: true,
             labels: true,
+            color: true,
         });
         let offset = |i: u32| {
             [

@@ -8,6 +8,7 @@ mod headset_cloud;
 mod lattice_mapper;
 mod lattice_mapper_services;
 mod lidar_odometry;
+mod map_colors;
 mod map_follower;
 mod map_labels;
 mod map_merger;

@@ -77,6 +77,7 @@ class VoxelMap:
         *,
         labels: bool = False,
         stamps: bool = False,
+        colors: bool = False,
         max_voxels: int = ...,
     ) -> VoxelMap: ...
     @property
@@ -94,8 +95,10 @@ class VoxelMap:
         xyz: npt.ArrayLike,
         labels: npt.ArrayLike | None = None,
         stamps: npt.ArrayLike | None = None,
+        colors: npt.ArrayLike | None = None,
     ) -> InsertReport:
-        """Adds points, with one label per point (-1 for none) and a stamp (ns, or datetime64) per point or for all.
+        """Adds points, with one label (-1 for none) and colour (uint8 of shape (n, 3)) per point and a stamp (ns, or
+        datetime64) per point or for all.
 
         Rows with a masked value are dropped and counted. An interrupted call has added some of the points.
         """
@@ -122,6 +125,10 @@ class VoxelMap:
         """Most frequent label of each cell, -1 without one."""
     def stamps(self) -> npt.NDArray[np.datetime64]:
         """Stamps of the first and the last point of each cell, datetime64[ns] of shape (n, 2)."""
+    def colors(self) -> npt.NDArray[np.uint8]:
+        """Mean red, green and blue of the coloured points of each cell, shape (n, 3); 0 without them."""
+    def color_counts(self) -> npt.NDArray[np.uint32]:
+        """Number of coloured points of each cell."""
 
 @final
 class Registration:

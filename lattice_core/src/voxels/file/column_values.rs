@@ -1,9 +1,9 @@
-//! Optional columns of a list as bytes: stamps and labels.
+//! Optional columns of a list as bytes: stamps, labels and colours.
 
 use super::read::ColumnError;
 use crate::voxels::codec::{Varints, push_varint, unzigzag, zigzag};
 use crate::voxels::store::payload_columns::Columns;
-use crate::voxels::{LabelCount, Stamps};
+use crate::voxels::{ColorSum, LabelCount, Stamps, Voxel};
 
 /// First and last stamp, each as the difference to the previous voxel.
 pub(super) fn encode_stamps(columns: &Columns) -> Vec<u8> {
@@ -75,6 +75,38 @@ pub(super) fn decode_labels(
         }
         labels.shrink_to_fit();
         column.push(labels);
+    }
+    expect_end(&mut values)?;
+    Ok(column)
+}
+
+/// For each voxel the number of coloured points and the sums of red, green and blue.
+pub(super) fn encode_colors(columns: &Columns) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(columns.colors.len().saturating_mul(8));
+    for ColorSum { count, sum } in columns.colors() {
+        push_varint(&mut bytes, count.into());
+        sum.iter().for_each(|sum| push_varint(&mut bytes, *sum));
+    }
+    bytes
+}
+
+/// Inverse of [`encode_colors`].
+pub(super) fn decode_colors(bytes: &[u8], voxels: &[Voxel]) -> Result<Vec<ColorSum>, ColumnError> {
+    let mut values = Varints::new(bytes);
+    let mut column = Vec::with_capacity(voxels.len());
+    for voxel in voxels {
+        let count = expect(&mut values)?;
+        let Ok(count) = u32::try_from(count) else {
+            return Err(values.error(format!("a voxel has {count} coloured points")));
+        };
+        let mut color = ColorSum { count, sum: [0; 3] };
+        for sum in &mut color.sum {
+            *sum = expect(&mut values)?;
+        }
+        if let Some(reason) = color.contradiction(voxel.count) {
+            return Err(values.error(reason));
+        }
+        column.push(color);
     }
     expect_end(&mut values)?;
     Ok(column)

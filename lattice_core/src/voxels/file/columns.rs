@@ -4,7 +4,7 @@ use super::MapContents;
 use super::contents::no_columns;
 use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::store::fixed_point::reach;
-use crate::voxels::{DistortionSums, LabelCount, Stamps, Voxel};
+use crate::voxels::{ColorSum, DistortionSums, LabelCount, Stamps, Voxel};
 
 /// Columns of a map, one row per voxel; validated when they become [`MapContents`].
 #[derive(Clone, PartialEq, Debug)]
@@ -21,6 +21,8 @@ pub struct MapColumns {
     pub stamps: Option<Vec<Stamps>>,
     /// Labels with their counts, ascending, if kept.
     pub labels: Option<Vec<Vec<LabelCount>>>,
+    /// Sums of colours, if kept.
+    pub colors: Option<Vec<ColorSum>>,
     /// Statistics of all points.
     pub statistics: DistortionSums,
 }
@@ -38,6 +40,7 @@ impl From<MapContents> for MapColumns {
             datum_index: map.datum_index,
             keys: map.keys,
             voxels: map.voxels,
+            colors: payload.color.then(|| map.columns.colors().collect()),
             stamps: payload.stamps.then_some(map.columns.stamps),
             labels: payload.labels.then_some(map.columns.labels),
             statistics: map.sums,
@@ -56,6 +59,9 @@ impl TryFrom<MapColumns> for MapContents {
         }
         if let Some(labels) = columns.labels {
             further.set_labels(labels);
+        }
+        if let Some(colors) = columns.colors {
+            further.set_colors(colors.into_iter());
         }
         let map = MapContents {
             lattice: columns.lattice,
@@ -86,6 +92,7 @@ impl MapColumns {
             ("counts", self.voxels.as_ref().map(Vec::len)),
             ("stamps", self.stamps.as_ref().map(Vec::len)),
             ("labels", self.labels.as_ref().map(Vec::len)),
+            ("colours", self.colors.as_ref().map(Vec::len)),
         ] {
             if let Some(len) = len.filter(|len| *len != rows) {
                 return Err(format!("there are {rows} keys and {len} rows of {name}"));
@@ -123,6 +130,13 @@ impl MapColumns {
                 ));
             }
         }
+        let counts = self.voxels.iter().flatten().map(|voxel| voxel.count);
+        let colors = self.colors.iter().flatten();
+        for ((key, color), count) in self.keys.iter().zip(colors).zip(counts) {
+            if let Some(reason) = color.contradiction(count) {
+                return Err(format!("cell {:?}: {reason}", key.unpack()));
+            }
+        }
         Ok(())
     }
 }
@@ -142,6 +156,7 @@ mod tests {
         let mut list = list.with_payload(Payload {
             stamps: true,
             labels: true,
+            color: true,
         });
         let points_m: Vec<_> = (0..20)
             .map(|i| Vector3::new(f64::from(i), 1.0, 0.3))
@@ -159,7 +174,7 @@ mod tests {
     #[test]
     fn columns_that_no_map_has_are_refused_with_the_numbers() {
         type Spoil = fn(&mut MapColumns);
-        let cases: [(&str, Spoil); 8] = [
+        let cases: [(&str, Spoil); 10] = [
             ("20 keys and 19 rows of counts", |c| {
                 c.voxels.as_mut().unwrap().truncate(19);
             }),
@@ -180,6 +195,12 @@ mod tests {
             }),
             ("do not ascend", |c| {
                 c.labels.as_mut().unwrap()[0] = vec![LabelCount { label: 3, count: 0 }];
+            }),
+            ("rows of colours", |c| {
+                c.colors.as_mut().unwrap().truncate(3)
+            }),
+            ("2 coloured points of 1", |c| {
+                c.colors.as_mut().unwrap()[0].count = 2;
             }),
             ("statistics 19", |c| c.statistics.points = 19),
         ];

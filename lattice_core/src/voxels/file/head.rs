@@ -139,9 +139,11 @@ pub(super) const OFFSET_SUM: Column = Column::new("offset_sum", Encoding::Signed
 pub(super) const STAMPS: Column = Column::new("stamps", Encoding::SignedSteps, 2, 10);
 /// Maximum: the number of labels, and each label with its count.
 pub(super) const LABELS: Column = Column::new("labels", Encoding::Rows, 1, 3 + 65_536 * 8);
+/// Number of coloured points, and the sums of red, green and blue, below 2^40.
+pub(super) const COLOR: Column = Column::new("color", Encoding::Unsigned, 4, 6);
 
-/// Columns in order: the first is required, the next two come together, the last two are optional.
-pub(super) const COLUMNS: [Column; 5] = [KEYS, COUNT, OFFSET_SUM, STAMPS, LABELS];
+/// Columns in order: the first is required, the next two come together, the last three are optional.
+pub(super) const COLUMNS: [Column; 6] = [KEYS, COUNT, OFFSET_SUM, STAMPS, LABELS, COLOR];
 
 /// Head of a section; columns of later versions have other names, encodings and codecs.
 #[derive(Clone, PartialEq, Eq, Debug)]

@@ -160,6 +160,7 @@ impl MapContents {
             ),
             ("stamps", ours.stamps != theirs.stamps),
             ("labels", ours.labels != theirs.labels),
+            ("colours", ours.color != theirs.color),
         ] {
             if differs {
                 return Err(OperationError::Payload(name));

@@ -2,11 +2,11 @@
 
 use std::io::{self, Read};
 
-use super::column_values::{decode_labels, decode_stamps, expect, expect_end};
+use super::column_values::{decode_colors, decode_labels, decode_stamps, expect, expect_end};
 use super::contents::no_columns;
 use super::head::{
-    COLUMNS, COUNT, Codec, Column, KEYS, OFFSET_SUM, SECTION_HEAD_BYTES, STAMPS, SectionHead,
-    corrupt,
+    COLUMNS, COUNT, Codec, Column, KEYS, LABELS, OFFSET_SUM, SECTION_HEAD_BYTES, STAMPS,
+    SectionHead, corrupt,
 };
 use super::source::Source;
 use super::{FileError, MAX_EXPANSION, MAX_WINDOW_LOG, MapContents};
@@ -155,6 +155,9 @@ impl From<CodecError> for ColumnError {
                 position,
                 format!("key {index} does not ascend or is not below 2^63"),
             ),
+            CodecError::Count { value, position } => {
+                (position, format!("count {value} does not fit 32 bits"))
+            }
             CodecError::TooMany { .. } => (0, "there are too many values".to_owned()),
         };
         ColumnError { offset, reason }
@@ -223,8 +226,10 @@ impl<R: Read> Source<R> {
             OFFSET_SUM => contents.set_sums(&bytes),
             STAMPS => decode_stamps(&bytes, contents.keys.len())
                 .map(|stamps| contents.columns.set_stamps(stamps)),
-            _ => decode_labels(&bytes, contents.keys.len())
+            LABELS => decode_labels(&bytes, contents.keys.len())
                 .map(|labels| contents.columns.set_labels(labels)),
+            _ => decode_colors(&bytes, contents.voxels.as_deref().unwrap_or_default())
+                .map(|colors| contents.columns.set_colors(colors.into_iter())),
         };
         done.map_err(|ColumnError { offset, reason }| {
             let (place, unpacked) = if packed {

@@ -5,7 +5,7 @@ use super::*;
 use crate::cloud::Cloud;
 use crate::lattice::{Lattice, LatticeKind, MortonKey};
 use crate::voxels::store::payload_columns::Columns;
-use crate::voxels::{LabelCount, Payload, Stamps, Voxel};
+use crate::voxels::{LabelCount, Payload, PointColumns, Stamps, Voxel};
 
 mod refused;
 
@@ -211,6 +211,7 @@ fn detailed(lattice: Lattice) -> VoxelList {
     let payload = Payload {
         stamps: true,
         labels: true,
+        color: true,
     };
     let empty = VoxelList::new(lattice, datum_m, 10_000).unwrap();
     let mut list = empty.with_payload(payload);
@@ -225,7 +226,16 @@ fn detailed(lattice: Lattice) -> VoxelList {
             offsets_m: offsets_m.collect(),
         };
         let labels: Vec<u16> = (0..250).map(|i| (i % 7) * 9362).collect();
-        list.insert_labelled(&cloud, &labels);
+        let colors: Vec<_> = (0..200_u8)
+            .map(|i| (i % 5 > 0).then_some([i, 255 - i, 7]))
+            .collect();
+        let columns = PointColumns {
+            stamp_ns: cloud.stamp_ns,
+            labels: &labels,
+            colors: &colors,
+            ..PointColumns::default()
+        };
+        list.insert_points(cloud.datum_m, &cloud.offsets_m, columns);
     }
     let gone = list.sorted().first().unwrap().0;
     assert!(VoxelStore::remove(&mut list, gone));
@@ -253,6 +263,10 @@ fn further_columns_go_with_their_voxels() {
         let twice = |l: LabelCount| (l.label, 2 * l.count);
         let label = both.label(key).map(|l| (l.label, l.count));
         assert_eq!(label, list.label(key).map(twice));
+        let once = list.color(key).unwrap();
+        let mut color = once;
+        color.add(&once);
+        assert_eq!(both.color(key), Some(color));
     }
     let mut plain = whole.clone();
     plain.columns = Columns::new(Payload::default());

@@ -2,9 +2,9 @@
 
 use std::io::Write;
 
-use super::column_values::{encode_labels, encode_stamps};
+use super::column_values::{encode_colors, encode_labels, encode_stamps};
 use super::head::{
-    COUNT, Codec, Column, END_TAG, Head, KEYS, LABELS, OFFSET_SUM, STAMPS, SectionHead,
+    COLOR, COUNT, Codec, Column, END_TAG, Head, KEYS, LABELS, OFFSET_SUM, STAMPS, SectionHead,
 };
 use super::lattice_figures::orientation_error;
 use super::{FileError, MAX_EXPANSION, MapContents, WriteOptions};
@@ -22,7 +22,8 @@ impl MapContents {
         }
         let voxels = self.voxels.as_ref().filter(|_| !options.occupancy_only);
         let payload = self.columns.payload();
-        let further = u32::from(payload.stamps) + u32::from(payload.labels);
+        let further = [payload.stamps, payload.labels, payload.color];
+        let further: u32 = further.into_iter().map(u32::from).sum();
         let head = Head {
             lattice: self.lattice.clone(),
             datum_index: self.datum_index,
@@ -54,6 +55,9 @@ impl MapContents {
             }
             if payload.labels {
                 sink.section(&LABELS, encode_labels(&self.columns), level)?;
+            }
+            if payload.color {
+                sink.section(&COLOR, encode_colors(&self.columns), level)?;
             }
         }
         sink.write(END_TAG)?;

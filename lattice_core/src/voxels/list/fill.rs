@@ -4,7 +4,7 @@ use crate::lattice::{BlockKey, MortonKey};
 use crate::voxels::store::fixed_point::{offsets_in, reach};
 use crate::voxels::store::payload_columns::{Columns, Details};
 use crate::voxels::store::shard::{SHARDS, shard_of};
-use crate::voxels::{LabelCount, Voxel, VoxelList, VoxelStore};
+use crate::voxels::{ColorSum, LabelCount, Voxel, VoxelList, VoxelStore};
 
 impl VoxelList {
     /// Adds new cells, with the optional columns that the list keeps, until it is full. Keys of one block should be
@@ -37,10 +37,16 @@ impl VoxelList {
         }
     }
 
-    /// Replaces a voxel and its labels; a voxel without points removes it.
+    /// Replaces a voxel, its labels and its colour; a voxel without points removes it.
     ///
-    /// Returns false, without a change, if the cell is new and the list is full. The statistics stay.
-    pub fn put(&mut self, key: MortonKey, voxel: &Voxel, labels: &[LabelCount]) -> bool {
+    /// A colour of more points than the voxel has, or with impossible sums, is left out. Returns false, without a change, if the cell is new and the list is full. The statistics stay.
+    pub fn put(
+        &mut self,
+        key: MortonKey,
+        voxel: &Voxel,
+        labels: &[LabelCount],
+        color: ColorSum,
+    ) -> bool {
         if voxel.count == 0 {
             self.remove(key);
             return true;
@@ -63,10 +69,13 @@ impl VoxelList {
             return false;
         };
         shard.add_offsets(number, &offsets_in(&voxel), now);
-        if self.payload.labels {
+        if !self.payload.is_plain() {
             let details = Details {
                 stamps: None,
                 labels: labels.to_vec(),
+                color: Some(color)
+                    .filter(|color| color.contradiction(voxel.count).is_none())
+                    .unwrap_or_default(),
             };
             shard.columns.add(number as usize, &details);
         }
@@ -87,6 +96,7 @@ mod tests {
         let lattice = Lattice::new(LatticeKind::Fcc, 1.0).unwrap();
         let labels = Payload {
             labels: true,
+            color: true,
             ..Payload::default()
         };
         let mut list = VoxelList::new(lattice, Vector3::zeros(), 2)
@@ -98,21 +108,26 @@ mod tests {
             sum: [i64::from(count), -5, 0],
         };
         let label = |count| [LabelCount { label: 7, count }];
-        assert!(list.put(keys[0], &voxel(3), &label(2)));
-        assert!(list.put(keys[1], &voxel(4_000_000_000), &[]));
-        assert!(!list.put(keys[2], &voxel(1), &[]));
+        assert!(list.put(keys[0], &voxel(3), &label(2), ColorSum::default()));
+        assert!(list.put(keys[1], &voxel(4_000_000_000), &[], ColorSum::default()));
+        assert!(!list.put(keys[2], &voxel(1), &[], ColorSum::default()));
         assert_eq!(list.take_changes().changed, keys[..2]);
-        assert!(list.put(keys[0], &voxel(9), &label(1)));
+        assert!(list.put(keys[0], &voxel(9), &label(1), ColorSum::default()));
         assert_eq!(list.get(keys[0]), Some(voxel(9)));
         assert_eq!(list.labels(keys[0]), label(1));
         assert_eq!(list.get(keys[1]), Some(voxel(4_000_000_000)));
+        let red = |count| ColorSum::of_points([255, 0, 0], count);
+        assert!(list.put(keys[0], &voxel(9), &label(1), red(9)));
+        assert_eq!(list.color(keys[0]), Some(red(9)));
+        assert!(list.put(keys[0], &voxel(9), &label(1), red(10)));
+        assert_eq!(list.color(keys[0]), Some(ColorSum::default()));
         let changes = |changed: &[_], removed: &[_]| Changes {
             changed: changed.to_vec(),
             removed: removed.to_vec(),
         };
         assert_eq!(list.take_changes(), changes(&keys[..1], &[]));
-        assert!(list.put(keys[1], &Voxel::default(), &[]));
-        assert!(list.put(keys[2], &voxel(1), &[]));
+        assert!(list.put(keys[1], &Voxel::default(), &[], ColorSum::default()));
+        assert!(list.put(keys[2], &voxel(1), &[], ColorSum::default()));
         assert_eq!(list.take_changes(), changes(&keys[2..], &keys[1..2]));
         // Sums that no points of the cell have are those of points at its border.
         list.put(
@@ -122,6 +137,7 @@ mod tests {
                 sum: [i64::MAX, 0, 0],
             },
             &[],
+            ColorSum::default(),
         );
         let reach = 2 * reach(list.lattice()) as i64;
         assert_eq!(list.get(keys[2]).unwrap().sum, [reach, 0, 0]);

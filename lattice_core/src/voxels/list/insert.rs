@@ -8,6 +8,7 @@ pub use super::insert_report::InsertReport;
 use crate::cloud::Cloud;
 use crate::lattice::{BatchBlock, BatchQuantizer, BlockKey, Coordinate};
 use crate::voxels::distortion::DistortionSums;
+use crate::voxels::store::color_sum::ColorSum;
 use crate::voxels::store::fixed_point::{FixedBlock, most_points, near_point};
 use crate::voxels::store::payload_columns::{Details, LabelCount, Stamps};
 use crate::voxels::store::point_gather::{Gather, Partial};
@@ -20,7 +21,7 @@ const PART: usize = 1 << 13;
 /// Points between two merges; bounds the memory of unmerged points.
 const WAVE: usize = 1 << 18;
 
-/// Stamps and labels of points.
+/// Stamps, labels and colours of points.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PointColumns<'a> {
     /// Stamp of points without one of their own, ns.
@@ -29,6 +30,8 @@ pub struct PointColumns<'a> {
     pub stamps_ns: &'a [i64],
     /// Labels of the first points; others have none.
     pub labels: &'a [u16],
+    /// Red, green and blue of the first points; others have no colour.
+    pub colors: &'a [Option<[u8; 3]>],
 }
 
 impl PointColumns<'_> {
@@ -37,6 +40,7 @@ impl PointColumns<'_> {
         PointColumns {
             stamps_ns: self.stamps_ns.get(place..).unwrap_or_default(),
             labels: self.labels.get(place..).unwrap_or_default(),
+            colors: self.colors.get(place..).unwrap_or_default(),
             ..self
         }
     }
@@ -45,6 +49,7 @@ impl PointColumns<'_> {
     fn details(&self, place: usize) -> Details {
         let stamp_ns = self.stamps_ns.get(place).copied().unwrap_or(self.stamp_ns);
         let label = self.labels.get(place).copied();
+        let color = self.colors.get(place).copied().flatten();
         Details {
             stamps: Some(Stamps {
                 first_ns: stamp_ns,
@@ -54,6 +59,7 @@ impl PointColumns<'_> {
                 .map(|label| LabelCount { label, count: 1 })
                 .into_iter()
                 .collect(),
+            color: color.map(ColorSum::of_point).unwrap_or_default(),
         }
     }
 }

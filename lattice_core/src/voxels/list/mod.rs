@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::distortion::{Distortion, DistortionSums};
+use super::store::color_sum::ColorSum;
 use super::store::fixed_point::reach;
 use super::store::growth;
 use super::store::payload_columns::{Columns, Details, LabelCount, Payload, Stamps};
@@ -95,7 +96,9 @@ impl VoxelList {
     /// handful of labels per voxel is assumed.
     pub fn voxels_within(max_bytes: usize, payload: Payload) -> usize {
         let columns = |kept: bool, bytes: usize| if kept { bytes } else { 0 };
-        let columns = columns(payload.stamps, 16) + columns(payload.labels, 24 + 8 * 8);
+        let columns = columns(payload.stamps, 16)
+            + columns(payload.labels, 24 + 8 * 8)
+            + columns(payload.color, 20);
         // A hash map may be less than half full.
         let removed = 5 * size_of::<(u64, Life)>() / 2;
         let voxel = Shard::VOXEL_BYTES + columns + columns / 4 + removed;
@@ -199,6 +202,15 @@ impl VoxelList {
             .unwrap_or_default()
     }
 
+    /// Sums of the colours of the points in a cell; `None` if not kept.
+    pub fn color(&self, key: MortonKey) -> Option<ColorSum> {
+        let code = BlockKey::from(key);
+        let shard = self.shard(code)?;
+        let (number, _) = shard.get(code)?;
+        let color = shard.columns.colors.get(number as usize)?;
+        Some(ColorSum::from(*color))
+    }
+
     /// Most frequent label of a cell, the smallest of equals.
     pub fn label(&self, key: MortonKey) -> Option<LabelCount> {
         let labels = self.labels(key).into_iter();
@@ -271,9 +283,12 @@ impl VoxelList {
         let mut counted = 0_u64;
         for shard in &self.shards {
             shard.validate()?;
+            let mut colors = shard.columns.colors();
             for (code, entry) in shard.iter() {
                 let voxel = shard.voxel(code, entry);
-                if let Some(reason) = voxel.contradiction(reach) {
+                let color = colors.next().unwrap_or_default();
+                let wrong = voxel.contradiction(reach);
+                if let Some(reason) = wrong.or_else(|| color.contradiction(voxel.count)) {
                     return Err(format!("voxel {:?}: {reason}", code.unpack()));
                 }
                 if entry.life.touched > self.sequence {

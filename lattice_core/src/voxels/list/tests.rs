@@ -318,16 +318,18 @@ fn doubles_far_from_the_datum_are_in_the_cells_of_the_closed_form() {
 }
 
 #[test]
-fn stamps_and_labels_go_with_their_points() {
+fn stamps_labels_and_colours_go_with_their_points() {
     let kept = Payload {
         stamps: true,
         labels: true,
+        color: true,
     };
     let mut map = list(LatticeKind::Cubic, [0.0; 3], 10).with_payload(kept);
     let columns = PointColumns {
         stamp_ns: 9,
         stamps_ns: &[4, 2],
         labels: &[5, 6],
+        colors: &[Some([255, 7, 0]), None, Some([1, 2, 3])],
     };
     map.insert_points(
         Vector3::zeros(),
@@ -344,4 +346,9 @@ fn stamps_and_labels_go_with_their_points() {
     );
     let labels = map.labels(key([0; 3])).into_iter().map(|known| known.label);
     assert!(labels.eq([5, 6]) && map.labels(key([2; 3])).is_empty());
+    let mean = |w| map.color(key(w)).and_then(|color| color.mean());
+    assert_eq!(mean([0; 3]), Some([255, 7, 0]));
+    assert_eq!(mean([2; 3]), Some([1, 2, 3]));
+    assert_eq!(map.color(key([1; 3])), None);
+    map.validate().unwrap();
 }

@@ -1,5 +1,6 @@
-//! Optional columns of voxels: stamps and labels.
+//! Optional columns of voxels: stamps, labels and colours.
 
+use super::color_sum::{ColorSum, PackedColor};
 use super::growth;
 
 /// Optional columns of a list; each costs memory and time.
@@ -9,6 +10,8 @@ pub struct Payload {
     pub stamps: bool,
     /// Number of points per label: 24 bytes per voxel and 8 per label.
     pub labels: bool,
+    /// Sums of the colours of the points: 20 bytes per voxel.
+    pub color: bool,
 }
 
 impl Payload {
@@ -55,6 +58,7 @@ pub(crate) struct Columns {
     payload: Payload,
     pub(crate) stamps: Vec<Stamps>,
     pub(crate) labels: Vec<Vec<LabelCount>>,
+    pub(crate) colors: Vec<PackedColor>,
 }
 
 /// Contribution of points to the optional columns of a voxel.
@@ -62,6 +66,7 @@ pub(crate) struct Columns {
 pub(crate) struct Details {
     pub(crate) stamps: Option<Stamps>,
     pub(crate) labels: Vec<LabelCount>,
+    pub(crate) color: ColorSum,
 }
 
 impl Columns {
@@ -70,6 +75,7 @@ impl Columns {
             payload,
             stamps: Vec::new(),
             labels: Vec::new(),
+            colors: Vec::new(),
         }
     }
 
@@ -90,10 +96,22 @@ impl Columns {
         self.labels = labels;
     }
 
+    /// Sets the colours, one row per voxel.
+    pub(crate) fn set_colors(&mut self, colors: impl Iterator<Item = ColorSum>) {
+        self.payload.color = true;
+        self.colors = colors.map(PackedColor::from).collect();
+    }
+
+    /// Colours of all rows.
+    pub(crate) fn colors(&self) -> impl Iterator<Item = ColorSum> {
+        self.colors.iter().map(|packed| ColorSum::from(*packed))
+    }
+
     /// Appends row `number` of columns of the same payload.
     pub(crate) fn push_row(&mut self, other: &Columns, number: usize) {
         self.stamps.extend(other.stamps.get(number));
         self.labels.extend(other.labels.get(number).cloned());
+        self.colors.extend(other.colors.get(number));
     }
 
     /// Rows of these indices, in this order.
@@ -112,12 +130,18 @@ impl Columns {
         if self.payload.labels {
             growth::push(&mut self.labels, Vec::new());
         }
+        if self.payload.color {
+            growth::push(&mut self.colors, PackedColor::default());
+        }
     }
 
     /// Adds to the kept columns of voxel `number`.
     pub(crate) fn add(&mut self, number: usize, details: &Details) {
         if let (Some(stamps), Some(more)) = (self.stamps.get_mut(number), details.stamps) {
             stamps.add(&more);
+        }
+        if let Some(color) = self.colors.get_mut(number) {
+            color.add(&details.color);
         }
         if let Some(labels) = self.labels.get_mut(number) {
             for more in &details.labels {
@@ -138,6 +162,7 @@ impl Columns {
         Details {
             stamps: self.stamps.get(number).copied(),
             labels: self.labels.get(number).cloned().unwrap_or_default(),
+            color: self.colors.get(number).copied().unwrap_or_default().into(),
         }
     }
 
@@ -147,6 +172,9 @@ impl Columns {
         }
         if self.payload.labels {
             self.labels.swap_remove(number);
+        }
+        if self.payload.color {
+            self.colors.swap_remove(number);
         }
     }
 
@@ -162,6 +190,7 @@ impl Columns {
         self.stamps.capacity() * size_of::<Stamps>()
             + self.labels.capacity() * size_of::<Vec<LabelCount>>()
             + labels.sum::<usize>()
+            + self.colors.capacity() * size_of::<PackedColor>()
     }
 
     /// Tests whether every kept column has `len` rows and every other none.
@@ -169,5 +198,6 @@ impl Columns {
         let expected = |kept: bool| if kept { len } else { 0 };
         self.stamps.len() == expected(self.payload.stamps)
             && self.labels.len() == expected(self.payload.labels)
+            && self.colors.len() == expected(self.payload.color)
     }
 }

@@ -29,6 +29,12 @@ struct Summary {
     voxels: usize,
     /// True if the file has a count and an offset sum for each voxel.
     counts: bool,
+    /// True if each voxel has the stamps of its first and last point.
+    stamps: bool,
+    /// True if each voxel has the numbers of its points by label.
+    labels: bool,
+    /// True if each voxel has the sums of the colours of its points.
+    colors: bool,
     points: u64,
     min_m: Option<[f64; 3]>,
     max_m: Option<[f64; 3]>,
@@ -54,6 +60,7 @@ impl Info {
             }
         }
         let distortion = map.distortion();
+        let kept = map.payload();
         let voxels = map.keys().len();
         let summary = Summary {
             lattice: map.lattice().kind().name(),
@@ -63,6 +70,9 @@ impl Info {
             datum_index: map.datum_index(),
             voxels,
             counts: map.voxels().is_some(),
+            stamps: kept.stamps,
+            labels: kept.labels,
+            colors: kept.color,
             points: distortion.points,
             min_m: bounds.map(|(min, _)| min),
             max_m: bounds.map(|(_, max)| max),
@@ -87,6 +97,16 @@ impl Info {
             ", without counts"
         };
         println!("voxels         {}{without}", summary.voxels);
+        let columns = [
+            (kept.stamps, "stamps"),
+            (kept.labels, "labels"),
+            (kept.color, "colours"),
+        ];
+        let columns: Vec<_> = columns.iter().filter(|(kept, _)| *kept).collect();
+        if !columns.is_empty() {
+            let names: Vec<_> = columns.iter().map(|(_, name)| *name).collect();
+            println!("columns        {}", names.join(", "));
+        }
         if let (Some(min), Some(max)) = (summary.min_m, summary.max_m) {
             println!("extent (m)     {min:.1?} to {max:.1?}");
         }

@@ -36,6 +36,7 @@ mod streams;
 mod unsent;
 mod versions;
 mod viewer;
+mod viewer_colors;
 mod viewer_foreign;
 mod viewer_headset;
 mod viewer_hostile;

@@ -43,6 +43,7 @@ impl Recipe {
         let mut list = list.with_payload(Payload {
             stamps: true,
             labels: self.labels,
+            ..Payload::default()
         });
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         for scan in 0..4 {

@@ -4,7 +4,8 @@
 use lattice_core::lattice::MortonKey;
 use lattice_msgs::lattice::LatticeMapUpdate;
 
-use super::voxels::{VoxelColumns, VoxelState, keys_from, voxels_from};
+use super::colors::VoxelColor;
+use super::voxels::{Decoded, VoxelColumns, keys_from, voxels_from};
 
 /// Checksum of all updates up to a state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,12 +19,20 @@ impl History {
 }
 
 /// Sum over a chunk of an update; the total is independent of the order of chunks.
-pub fn changes_sum(voxels: &[(MortonKey, VoxelState)], removed: &[MortonKey]) -> u64 {
-    let voxels = voxels.iter().map(|(key, state)| {
+pub fn changes_sum(changed: &Decoded, removed: &[MortonKey]) -> u64 {
+    let mut colors = changed.colors.iter().peekable();
+    let voxels = changed.voxels.iter().map(|(key, state)| {
         let [x, y, z] = state.mean_offset.map(|v| u64::from(v.cast_unsigned()));
         let mean = u64::from(state.count) | x << 32 | y << 48;
         let label = z | u64::from(state.label) << 16 | u64::from(state.label_count) << 32;
-        mix(mix(mix(key.raw()) ^ mean) ^ label)
+        let sum = mix(mix(mix(key.raw()) ^ mean) ^ label);
+        match colors.next_if(|(colored, _)| colored == key) {
+            Some((_, VoxelColor { count, rgb })) => {
+                let [r, g, b] = rgb.map(u64::from);
+                mix(sum ^ (r | g << 8 | b << 16 | u64::from(*count) << 32))
+            }
+            None => sum,
+        }
     });
     let removed = removed.iter().map(|key| mix(!key.raw()));
     voxels.chain(removed).fold(0, u64::wrapping_add)

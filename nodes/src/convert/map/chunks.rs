@@ -6,6 +6,7 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use nalgebra::Vector3;
 use serde_bytes::ByteBuf;
 
+use super::colors::{VoxelColor, keys_with_colors, plain_keys};
 use super::error::KEY_ENCODING;
 use super::lattice_info::{MapStamp, info_of};
 use super::voxels::labels_of;
@@ -17,9 +18,14 @@ const PAYLOAD_BYTES: usize = 4 + 3 * 2;
 /// Label and label count of one voxel.
 const LABEL_BYTES: usize = 2 + 4;
 
-/// Payload of a chunk's voxels; columns are empty if not kept.
+/// Colour of one voxel: its count as LEB128 and three bytes.
+const COLOR_BYTES: usize = 5 + 3;
+
+/// Keys and payload of a chunk's voxels; columns are empty if not kept.
 #[derive(Default)]
 struct Payloads {
+    keys: ByteBuf,
+    key_encoding: String,
     counts: Vec<u32>,
     mean_offsets: Vec<i16>,
     labels: Vec<u16>,
@@ -30,11 +36,28 @@ impl Payloads {
     fn of(list: &VoxelList, keys: &[MortonKey]) -> Self {
         let voxels = list.get_all(keys);
         let (labels, label_counts) = labels_of(list, keys);
+        let color = |key| VoxelColor::of_cell(list, key);
+        let (encoded, key_encoding) = match list.payload().color {
+            true => keys_with_colors(keys, color),
+            false => plain_keys(keys),
+        };
         Self {
+            keys: encoded,
+            key_encoding,
             counts: voxels.iter().map(|voxel| voxel.count).collect(),
             mean_offsets: mean_offsets(voxels.iter(), offset_unit_m(list.lattice())),
             labels,
             label_counts,
+        }
+    }
+
+    /// Keys alone.
+    fn of_cells(keys: &[MortonKey]) -> Self {
+        let (keys, key_encoding) = plain_keys(keys);
+        Self {
+            keys,
+            key_encoding,
+            ..Self::default()
         }
     }
 }
@@ -56,7 +79,7 @@ pub fn keyframe_of_cells(
     stamp: &MapStamp,
 ) -> Vec<LatticeMap> {
     let parts = split(keys, 0, stamp.chunk_bytes);
-    keyframe_of_parts(lattice, datum_m, &parts, stamp, |_| Payloads::default())
+    keyframe_of_parts(lattice, datum_m, &parts, stamp, Payloads::of_cells)
 }
 
 fn keyframe_of_parts(
@@ -77,9 +100,9 @@ fn keyframe_of_parts(
             chunk,
             chunks: parts.len() as u32,
             voxels_total: total as u64,
-            key_encoding: KEY_ENCODING.to_owned(),
+            key_encoding: payloads.key_encoding,
             voxels: keys.len() as u32,
-            keys: ByteBuf::from(codec::encode_keys(keys)),
+            keys: payloads.keys,
             counts: payloads.counts,
             offset_unit_m: offset_unit_m(lattice),
             mean_offsets: payloads.mean_offsets,
@@ -116,8 +139,8 @@ pub fn update_of_cells(
     previous_sequence: u64,
     stamp: &MapStamp,
 ) -> Vec<LatticeMapUpdate> {
-    let (place, none) = ((lattice, datum_m), |_: &[MortonKey]| Payloads::default());
-    update_of_parts(place, changes, 0, previous_sequence, stamp, none)
+    let (place, cells) = ((lattice, datum_m), Payloads::of_cells);
+    update_of_parts(place, changes, 0, previous_sequence, stamp, cells)
 }
 
 fn update_of_parts(
@@ -143,7 +166,8 @@ fn update_of_parts(
         let payloads = payloads(keys);
         out.push(LatticeMapUpdate {
             voxels: keys.len() as u32,
-            keys: ByteBuf::from(codec::encode_keys(keys)),
+            key_encoding: payloads.key_encoding,
+            keys: payloads.keys,
             counts: payloads.counts,
             mean_offsets: payloads.mean_offsets,
             labels: payloads.labels,
@@ -181,10 +205,9 @@ fn mean_offsets<'a>(voxels: impl Iterator<Item = &'a Voxel>, unit_m: f64) -> Vec
 
 /// Bytes of a voxel besides its key.
 fn payload_bytes(list: &VoxelList) -> usize {
-    match list.payload().labels {
-        true => PAYLOAD_BYTES + LABEL_BYTES,
-        false => PAYLOAD_BYTES,
-    }
+    let kept = list.payload();
+    let of = |kept: bool, bytes: usize| if kept { bytes } else { 0 };
+    PAYLOAD_BYTES + of(kept.labels, LABEL_BYTES) + of(kept.color, COLOR_BYTES)
 }
 
 /// Splits sorted keys so that each part fits `chunk_bytes`; at least one part, of at least one key.

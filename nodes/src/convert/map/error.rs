@@ -1,10 +1,13 @@
 //! Error of a map message.
 
 use lattice_core::voxels::codec;
+use lattice_msgs::lattice::LatticeMap;
 use thiserror::Error;
 
 /// Supported key encoding: Morton-sorted 21-bit indices, LEB128 varints of differences.
-pub const KEY_ENCODING: &str = "morton21_delta_leb128";
+pub const KEY_ENCODING: &str = LatticeMap::KEY_ENCODING_MORTON21;
+/// The same with the mean colours of the voxels after the keys.
+pub const COLOR_ENCODING: &str = LatticeMap::KEY_ENCODING_MORTON21_COLORS;
 
 /// Reason for rejecting a `LatticeMap` or `LatticeMapUpdate`.
 #[derive(Debug, Error)]
@@ -20,7 +23,9 @@ pub enum MapMessageError {
         reason: String,
     },
     /// Unsupported key encoding.
-    #[error("key encoding '{0}' is unknown, expected '{KEY_ENCODING}'")]
+    #[error(
+        "key encoding '{0}' is unknown, expected '{KEY_ENCODING}' or '{COLOR_ENCODING}': install one version of Lattice on both sides"
+    )]
     Encoding(String),
     /// Invalid keys.
     #[error("voxel keys: {0}")]

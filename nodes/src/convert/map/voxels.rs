@@ -5,7 +5,8 @@ use lattice_core::registration::UNLABELED;
 use lattice_core::voxels::{VoxelList, codec};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 
-use super::error::{KEY_ENCODING, MapMessageError};
+use super::colors::{VoxelColor, decode_colors, part_colors};
+use super::error::MapMessageError;
 
 /// Voxel as a consumer receives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,12 +21,23 @@ pub struct VoxelState {
     pub label_count: u32,
 }
 
+/// Voxels of a message.
+#[derive(Debug, Default)]
+pub struct Decoded {
+    /// Voxels in the order of their keys.
+    pub voxels: Vec<(MortonKey, VoxelState)>,
+    /// Colours of those that have one, in the same order.
+    pub colors: Vec<(MortonKey, VoxelColor)>,
+}
+
 /// Voxel columns of a message; empty if not kept.
 #[derive(Clone, Copy, Debug)]
 pub struct VoxelColumns<'a> {
     /// Encoding of the keys.
     pub key_encoding: &'a str,
-    /// Keys.
+    /// Number of voxels.
+    pub voxels: u32,
+    /// Keys, and colours if the encoding has them.
     pub keys: &'a [u8],
     /// Points.
     pub counts: &'a [u32],
@@ -41,6 +53,7 @@ impl<'a> From<&'a LatticeMap> for VoxelColumns<'a> {
     fn from(message: &'a LatticeMap) -> Self {
         Self {
             key_encoding: &message.key_encoding,
+            voxels: message.voxels,
             keys: &message.keys,
             counts: &message.counts,
             mean_offsets: &message.mean_offsets,
@@ -54,6 +67,7 @@ impl<'a> From<&'a LatticeMapUpdate> for VoxelColumns<'a> {
     fn from(message: &'a LatticeMapUpdate) -> Self {
         Self {
             key_encoding: &message.key_encoding,
+            voxels: message.voxels,
             keys: &message.keys,
             counts: &message.counts,
             mean_offsets: &message.mean_offsets,
@@ -64,11 +78,10 @@ impl<'a> From<&'a LatticeMapUpdate> for VoxelColumns<'a> {
 }
 
 /// Voxels of a keyframe chunk, or of the changed part of an update.
-pub fn voxels_from(
-    columns: VoxelColumns,
-    max_voxels: usize,
-) -> Result<Vec<(MortonKey, VoxelState)>, MapMessageError> {
-    let keys = keys_from(columns.key_encoding, columns.keys, max_voxels)?;
+pub fn voxels_from(columns: VoxelColumns, max_voxels: usize) -> Result<Decoded, MapMessageError> {
+    let (keys, colors) = part_colors(columns.key_encoding, columns.keys, columns.voxels)?;
+    let keys = codec::decode_keys(keys, max_voxels)?;
+    let colors = colors.map_or(Ok(Vec::new()), |colors| decode_colors(colors, &keys))?;
     let check = |column, expected, found| {
         if expected == found {
             Ok(())
@@ -100,7 +113,7 @@ pub fn voxels_from(
     // Occupancy maps have no payload: one point at the centre.
     let payloads = payloads.chain(std::iter::repeat((1, [0; 3])));
     let voxels = keys.into_iter().zip(payloads).zip(labels);
-    Ok(voxels
+    let voxels = voxels
         .map(|((key, (count, mean_offset)), (label, label_count))| {
             let state = VoxelState {
                 count,
@@ -110,20 +123,18 @@ pub fn voxels_from(
             };
             (key, state)
         })
-        .collect())
+        .collect();
+    Ok(Decoded { voxels, colors })
 }
 
-/// Keys of a message.
+/// Keys without colours of a message: those of removed voxels.
 pub fn keys_from(
     key_encoding: &str,
     keys: &[u8],
     max_voxels: usize,
 ) -> Result<Vec<MortonKey>, MapMessageError> {
-    if key_encoding != KEY_ENCODING {
-        return Err(MapMessageError::Encoding(
-            key_encoding.chars().take(32).collect(),
-        ));
-    }
+    // No voxels: only the name of the encoding is validated.
+    part_colors(key_encoding, &[], 0)?;
     Ok(codec::decode_keys(keys, max_voxels)?)
 }
 

@@ -194,7 +194,7 @@ impl CorrectedDrive {
         let limits = CloudLimits {
             max_points: machine.options.max_cloud_points,
         };
-        let with_fields = machine.options.labels.is_some();
+        let with_fields = machine.options.labels.is_some() || machine.options.keep_color;
         Ok(KeptCloud::thin(
             message,
             &limits,

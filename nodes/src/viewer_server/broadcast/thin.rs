@@ -6,6 +6,7 @@ use lattice_msgs::cdr::{self, CdrError};
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 
 use super::map_stream::{Entry, entry};
+use crate::convert::map::part_colors;
 
 /// Name of the encoding: `keys` contains the Morton keys, then the counts in the same order as LEB128.
 pub const ENCODING: &str = "morton21_delta_leb128_counts_leb128";
@@ -29,6 +30,9 @@ macro_rules! thin {
     ($($message:ty),*) => {
         $(impl Thin for $message {
             fn thin(mut self) -> Self {
+                let parts = part_colors(&self.key_encoding, &self.keys, self.voxels);
+                let end = parts.map_or(self.keys.len(), |(keys, _)| keys.len());
+                self.keys.truncate(end);
                 self.keys.extend(codec::encode_counts(&self.counts));
                 self.counts.clear();
                 self.key_encoding = ENCODING.to_owned();

@@ -65,6 +65,15 @@ fn forged_sections_are_refused_where_they_are_wrong() {
     let data = head + SECTION_HEAD_BYTES as u64;
     let named = vec![of(b"KEYS", plain, &FIRST_KEY)];
     let empty_cell = vec![keys(), count(0), sums()];
+    let color = |values: &[u8]| {
+        let color = of(b"color", [1, 4, 0, 0], values);
+        vec![keys(), count(1), sums(), color]
+    };
+    let of_color = data + 9 + 49 + 51 + 48;
+    let good = forged(&map, 1, &color(&[1, 0xff, 1, 7, 0]));
+    let list = read_map(&good[..], 1).unwrap();
+    let key = list.sorted_keys()[0];
+    assert_eq!(list.color(key).unwrap().mean(), Some([255, 7, 0]));
     for (voxels, sections, position, words) in [
         (1, vec![], head, "section \"keys\" is missing"),
         (1, vec![count(1)], head, "is \"count\", out of order"),
@@ -79,6 +88,16 @@ fn forged_sections_are_refused_where_they_are_wrong() {
         (20, vec![keys()], head, "9 bytes do not fit"),
         (u64::MAX, vec![keys()], head, "9 bytes do not fit"),
         (0, vec![keys()], head, "9 bytes do not fit"),
+        (
+            1,
+            color(&[2, 0, 0, 0]),
+            of_color + 4,
+            "2 coloured points of 1",
+        ),
+        (1, color(&[1, 0x80, 2, 0, 0]), of_color + 5, "exceed 255"),
+        (1, color(&[0, 1, 0, 0]), of_color + 4, "exceed 0"),
+        (1, color(&[1, 0xff, 1, 7]), of_color + 4, "too few values"),
+        (1, color(&[1, 0, 7, 0, 0]), of_color + 5, "too many values"),
         (1, empty_cell, data + 9 + 49 + 51, "without points"),
         (1, vec![keys(), count(2), sums()], 160, "statistics 1"),
         (1, keys_of([1, 1, 0, 0], &FIRST_KEY), head, "encoding"),

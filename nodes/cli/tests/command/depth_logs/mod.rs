@@ -9,7 +9,9 @@ use lattice_core::voxels::VoxelList;
 use lattice_core::voxels::file::MapContents;
 use serde_json::Value;
 
-use self::scene::{ALIGNED, CLOUDS, Cells, DEPTH, FRAMES, Log, difference, reference};
+use self::scene::{
+    ALIGNED, CLOUDS, Cells, DEPTH, FRAMES, Log, color_reference, difference, reference,
+};
 use crate::lattice;
 
 /// Arguments of replays of depth images: all pixels become points.
@@ -92,6 +94,49 @@ impl Replayed {
         );
     }
 
+    /// Mean colours and their numbers of points, in the order of the keys.
+    fn colors(&self) -> Vec<Option<(u32, [u8; 3])>> {
+        let color = |key: &_| {
+            let color = self.map.color(*key)?;
+            Some((color.count, color.mean()?))
+        };
+        self.map
+            .sorted()
+            .iter()
+            .map(|(key, _)| color(key))
+            .collect()
+    }
+
+    /// Checks the mean colours to 1 of 255 in the cells that have the points of those by hand.
+    fn check_colors(&self) {
+        let expected = color_reference();
+        let mut same = 0;
+        let datum = self.map.datum_index();
+        for ((key, _), color) in self.map.sorted().into_iter().zip(self.colors()) {
+            let index = key.unpack();
+            let cell = [0, 1, 2].map(|i: usize| i64::from(index[i]) + datum[i]);
+            let (count, mean) = color.unwrap();
+            let Some((_, sum)) = expected.get(&cell).filter(|(points, _)| *points == count) else {
+                continue;
+            };
+            same += 1;
+            let exact = sum.map(|sum| sum / f64::from(count));
+            let apart = mean
+                .iter()
+                .zip(exact)
+                .map(|(m, e)| (f64::from(*m) - e).abs());
+            assert!(
+                apart.fold(0.0, f64::max) <= 1.0,
+                "{cell:?}: {mean:?}, {exact:?}"
+            );
+        }
+        assert!(
+            50 * same > 49 * expected.len(),
+            "{same} of {}",
+            expected.len()
+        );
+    }
+
     fn camera(&self) -> &Value {
         &self.report["cameras"][0]
     }
@@ -122,6 +167,7 @@ fn check_both(log: Log, arguments: &[&str]) -> Replayed {
         of_dds.errors
     );
     assert_eq!(of_dds.cells(), direct.cells());
+    assert_eq!(of_dds.colors(), direct.colors());
     for replayed in [&direct, &of_dds] {
         let camera = replayed.camera();
         assert_eq!(camera["topic"], log.depth(), "{camera}");
@@ -167,7 +213,8 @@ fn compressed_depth_with_colours_gives_the_same_map() {
         with_colors: true,
         ..Log::default()
     };
-    let direct = check_both(log, &["-p", "use_color:=true"]);
+    let direct = check_both(log, &["-p", "use_color:=true", "-p", "keep_color:=true"]);
+    direct.check_colors();
     assert_eq!(direct.camera()["color_in"], FRAMES);
     direct.says(&["colours /camera/color/image_raw"]);
 }

@@ -107,29 +107,71 @@ fn ray(column: u32, row: u32) -> Vector3<f64> {
     Vector3::new(x, y, 1.0)
 }
 
+/// Red, green and blue of a pixel.
+fn color(column: u32, row: u32, label: u8) -> [u8; 3] {
+    [label * 40, (3 * column) as u8, 255 - (4 * row) as u8]
+}
+
+/// Point of the map by hand.
+struct Point {
+    cell: [i64; 3],
+    /// True if it is too near to a border of the cell.
+    is_near: bool,
+    label: u8,
+    rgb: [u8; 3],
+}
+
+fn points(frame: i64) -> Vec<Point> {
+    let camera = pose(frame) * mount();
+    let pixels = (0..HEIGHT).flat_map(|row| (0..WIDTH).map(move |column| (column, row)));
+    let pixels = pixels.zip(seen(frame));
+    let with_depth = pixels.filter(|(_, (depth_mm, _))| *depth_mm > 0);
+    let point = |((column, row), (depth_mm, label)): ((u32, u32), (u16, u8))| {
+        let seen = ray(column, row) * f64::from(depth_mm) * 1e-3;
+        let point_m = camera.transform_point(&seen.into());
+        let cell = [0, 1, 2].map(|i| (point_m[i] / CELL_M).round() as i64);
+        let is_near = |i: usize| {
+            let from_center_m = (point_m[i] - cell[i] as f64 * CELL_M).abs();
+            from_center_m > 0.5 * CELL_M - BORDER_M
+        };
+        Point {
+            cell,
+            is_near: (0..3).any(is_near),
+            label,
+            rgb: color(column, row, label),
+        }
+    };
+    with_depth.map(point).collect()
+}
+
 /// The cells of the first frames, and the number of points too near to a border.
 pub fn reference(with_labels: bool, frames: impl IntoIterator<Item = i64>) -> (Cells, u32) {
     let (mut cells, mut near) = (Cells::new(), 0);
-    for frame in frames {
-        let camera = pose(frame) * mount();
-        let pixels = (0..HEIGHT).flat_map(|row| (0..WIDTH).map(move |column| (column, row)));
-        for ((column, row), (depth_mm, label)) in pixels.zip(seen(frame)) {
-            if depth_mm == 0 {
-                continue;
-            }
-            let point_m =
-                camera.transform_point(&(ray(column, row) * f64::from(depth_mm) * 1e-3).into());
-            let cell = [0, 1, 2].map(|i| (point_m[i] / CELL_M).round() as i64);
-            let is_near = |i: usize| {
-                let from_center_m = (point_m[i] - cell[i] as f64 * CELL_M).abs();
-                from_center_m > 0.5 * CELL_M - BORDER_M
-            };
-            near += u32::from((0..3).any(is_near));
-            let label = if with_labels { label.into() } else { u16::MAX };
-            *cells.entry(cell).or_default().entry(label).or_default() += 1;
-        }
+    for point in frames.into_iter().flat_map(points) {
+        near += u32::from(point.is_near);
+        let label = if with_labels {
+            point.label.into()
+        } else {
+            u16::MAX
+        };
+        *cells
+            .entry(point.cell)
+            .or_default()
+            .entry(label)
+            .or_default() += 1;
     }
     (cells, near)
+}
+
+/// Number of points and sums of red, green and blue of each cell.
+pub fn color_reference() -> BTreeMap<[i64; 3], (u32, [f64; 3])> {
+    let mut cells = BTreeMap::<_, (u32, [f64; 3])>::new();
+    for point in (0..FRAMES).flat_map(points) {
+        let (count, sum) = cells.entry(point.cell).or_default();
+        *count += 1;
+        (sum.iter_mut().zip(point.rgb)).for_each(|(sum, value)| *sum += f64::from(value));
+    }
+    cells
 }
 
 /// Difference of two maps in points.
@@ -310,7 +352,9 @@ impl Log {
             log.add(LABELS, came_ns + 1_000_000_000, &labels);
         }
         if self.with_colors {
-            let colors = pixels.iter().flat_map(|(_, label)| [*label * 40, 90, 200]);
+            let places = (0..HEIGHT).flat_map(|row| (0..WIDTH).map(move |column| (column, row)));
+            let colors = places.zip(&pixels);
+            let colors = colors.flat_map(|((column, row), (_, label))| color(column, row, *label));
             let colors = image(stamp_ns, "rgb8", 3, colors.collect());
             log.add(COLORS, came_ns + 2, &colors);
         }
