@@ -26,6 +26,9 @@ const SEARCH_TIME: Duration = Duration::from_secs(3);
 /// Time for which a goal waits for the map and transforms.
 const INPUT_TIME: Duration = Duration::from_secs(10);
 
+/// Characters of a client's name that are repeated in a text.
+const MOST_NAMED: usize = 64;
+
 /// State shared with the thread of a search.
 #[derive(Default)]
 struct Shared {
@@ -77,7 +80,7 @@ impl Planner {
     ) {
         if !goal.planner_id.is_empty() && !self.named {
             self.named = true;
-            let id = &goal.planner_id;
+            let id: String = goal.planner_id.chars().take(MOST_NAMED).collect();
             log::info!("planner_id {id} makes no difference: this node has one planner");
         }
         self.waiting.push_back(Waiting {
@@ -140,6 +143,7 @@ impl Planner {
                 false => robot.pose_of(from, &frame),
             };
             let no_tf = || {
+                let from: String = from.chars().take(MOST_NAMED).collect();
                 let text =
                     format!("no transform from {from} to {frame}: check /tf, or plan in {frame}");
                 PlanFailure::missing(Codes::TF_ERROR, text)

@@ -142,15 +142,15 @@ impl<'a> Builder<'a> {
             },
             color: match self.options.color_by {
                 ColorBy::Height => Some(self.color_at(at_m.z)),
-                ColorBy::Color => Some(self.color.clone()),
+                ColorBy::Color => Some(self.color),
                 ColorBy::Flat => None,
             },
         }
     }
 
     fn push(&mut self, corner: &Corner) {
-        self.points.push(corner.point.clone());
-        self.colors.extend(corner.color.clone());
+        self.points.push(corner.point);
+        self.colors.extend(corner.color);
     }
 
     fn color_at(&self, z_m: f64) -> ColorRGBA {
