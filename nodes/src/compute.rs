@@ -265,6 +265,24 @@ mod tests {
     }
 
     #[test]
+    fn the_thread_is_one_of_its_pool() {
+        for threads in [1, 3] {
+            let (done, results) = unbounded();
+            let limits = ComputeLimits { threads, ..LIMITS };
+            let worker = Compute::spawn("test", limits, Shutdown::default(), move |_: u32| {
+                let name = thread::current().name().map(str::to_owned);
+                let barrier = std::sync::Barrier::new(threads);
+                // Ends only if so many threads are at work at once.
+                rayon::broadcast(|_| barrier.wait());
+                done.send((name, rayon::current_num_threads())).unwrap();
+            });
+            worker.unwrap().finish_with(0);
+            let name = Some("test compute".to_owned());
+            assert_eq!(results.recv(), Ok((name, threads)));
+        }
+    }
+
+    #[test]
     fn a_dropped_worker_ends_though_its_inbox_is_held_and_full() {
         for waiting in 0..4 {
             let (_alive, ended) = unbounded::<()>();

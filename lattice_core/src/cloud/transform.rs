@@ -1,11 +1,12 @@
 //! Deskewing: transforms every point to the map frame with the pose at its own time, from record to record in one
 //! pass.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
 use rayon::prelude::*;
 
+use super::block::{Block, LANES, at};
 use super::record::{Copies, Precision, RecordFormat, write_vector};
-use super::{CloudView, NO_TIME_NS};
+use super::{CloudView, NO_TIME_NS, RangeLimits};
 
 /// Minimum number of points per task.
 const MIN_CHUNK: usize = 2048;
@@ -15,26 +16,6 @@ const CHUNKS_PER_THREAD: usize = 4;
 const MEMO_BITS: u32 = 15;
 /// Slot of a point without a time.
 const NO_SLOT: u32 = u32::MAX;
-
-/// Range limits in the sensor frame: `min_range_m < distance <= max_range_m`.
-///
-/// The origin of the sensor, which many drivers send for a missing return, is always dropped.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RangeLimits {
-    /// Distance up to which points are dropped, metres.
-    pub min_range_m: f64,
-    /// Maximum distance, metres.
-    pub max_range_m: f64,
-}
-
-impl Default for RangeLimits {
-    fn default() -> RangeLimits {
-        RangeLimits {
-            min_range_m: 0.0,
-            max_range_m: f64::INFINITY,
-        }
-    }
-}
 
 /// Transformed records in the order of the cloud, and the numbers of dropped points.
 #[derive(Clone, Debug, PartialEq)]
@@ -255,7 +236,10 @@ where
             let lanes = LANES.min(end - start);
             self.view.read(start, lanes, &mut block.points_m);
             block.measure();
-            let mut kept = block.kept(lanes, self.range, &mut counts);
+            let (finite, in_range) = block.outcomes(lanes, self.range);
+            counts.not_finite += lanes - finite.count_ones() as usize;
+            counts.out_of_range += (finite & !in_range).count_ones() as usize;
+            let mut kept = finite & in_range;
             if !matches!(known, Known::Shared(_)) {
                 for lane in 0..lanes {
                     if kept & (1 << lane) == 0 {
@@ -288,86 +272,6 @@ where
             }
         }
         Ok(counts)
-    }
-}
-
-/// Points of a block.
-pub(super) const LANES: usize = 16;
-
-/// One number of each point of a block.
-pub(super) type Lanes = [f64; LANES];
-
-#[inline(always)]
-fn at(vectors: &[Lanes; 3], lane: usize) -> Vector3<f64> {
-    Vector3::from(vectors.map(|lanes| lanes.get(lane).copied().unwrap_or(f64::NAN)))
-}
-
-/// Points that are transformed together, each by its own pose; vectorized by the compiler.
-#[derive(Default)]
-struct Block {
-    points_m: [Lanes; 3],
-    distances_m: Lanes,
-    /// Vector part and scalar of the rotation.
-    rotation: [Lanes; 4],
-    translation_m: [Lanes; 3],
-    moved_m: [Lanes; 3],
-}
-
-impl Block {
-    #[inline(always)]
-    fn set_pose(&mut self, lane: usize, pose: &Isometry3<f64>) {
-        let [i, j, k, w] = pose.rotation.coords.into();
-        for (lanes, value) in self.rotation.iter_mut().zip([i, j, k, w]) {
-            lanes[lane % LANES] = value;
-        }
-        for (lanes, value) in self.translation_m.iter_mut().zip(&pose.translation.vector) {
-            lanes[lane % LANES] = *value;
-        }
-    }
-
-    /// Distances of the points from the sensor.
-    #[inline(always)]
-    fn measure(&mut self) {
-        let [x, y, z] = &self.points_m;
-        for lane in 0..LANES {
-            let squared = x[lane] * x[lane] + y[lane] * y[lane] + z[lane] * z[lane];
-            self.distances_m[lane] = squared.sqrt();
-        }
-    }
-
-    /// Bits of the first `lanes` points that are finite and in range; the others are counted.
-    #[inline(always)]
-    fn kept(&self, lanes: usize, range: &RangeLimits, counts: &mut Counts) -> u32 {
-        let (mut finite, mut kept) = (0_u32, 0_u32);
-        for lane in 0..LANES {
-            let distance_m = self.distances_m[lane];
-            let in_range = distance_m > range.min_range_m && distance_m <= range.max_range_m;
-            finite |= u32::from(distance_m.is_finite()) << lane;
-            kept |= u32::from(distance_m.is_finite() && in_range) << lane;
-        }
-        let there = (1 << lanes) - 1;
-        counts.not_finite += (there & !finite).count_ones() as usize;
-        counts.out_of_range += (there & finite & !kept).count_ones() as usize;
-        kept & there
-    }
-
-    /// Rotates and moves the points: the product of nalgebra's isometry and point, operation by operation.
-    #[inline(always)]
-    fn transform(&mut self) {
-        let [x, y, z] = &self.points_m;
-        let [i, j, k, w] = &self.rotation;
-        let [dx, dy, dz] = &self.translation_m;
-        let [mx, my, mz] = &mut self.moved_m;
-        for lane in 0..LANES {
-            let (x, y, z) = (x[lane], y[lane], z[lane]);
-            let (i, j, k, w) = (i[lane], j[lane], k[lane], w[lane]);
-            let tx = (j * z - k * y) * 2.0;
-            let ty = (k * x - i * z) * 2.0;
-            let tz = (i * y - j * x) * 2.0;
-            mx[lane] = tx * w + (j * tz - k * ty) + x + dx[lane];
-            my[lane] = ty * w + (k * tx - i * tz) + y + dy[lane];
-            mz[lane] = tz * w + (i * ty - j * tx) + z + dz[lane];
-        }
     }
 }
 

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
+use super::block::{LANES, Lanes};
 use super::coordinates::Coordinates;
-use super::transform::{LANES, Lanes};
 use super::{CloudError, CloudLayout, CloudLimits, Datatype, PointField};
 
 /// View of a validated cloud: points by index, row by row, without copying.

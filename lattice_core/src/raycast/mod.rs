@@ -13,6 +13,7 @@ mod map;
 mod masks;
 mod packed;
 mod scan;
+mod steps;
 mod surface;
 mod traversal;
 

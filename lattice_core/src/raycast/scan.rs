@@ -6,12 +6,11 @@ use rustc_hash::FxHashSet;
 use super::families::{Families, Origin, Ray};
 use super::masks::{Cursor, ScanMasks};
 use super::packed::Packed;
+use super::steps::{Line, Place, Visit, step_all};
 use super::surface::Probe;
 use super::traversal::{Kernel, Outside, Traversal};
 use crate::cloud::Cloud;
 use crate::lattice::Simd;
-
-const LANES: usize = 4;
 
 /// Points seen from one position, in the map frame; a scan is one or more of these.
 #[derive(Clone, Copy, Debug)]
@@ -113,14 +112,6 @@ pub(super) fn mark(
     }
     mark_bundles(&bundles, masks, probe, &mut report);
     report
-}
-
-/// Straight line from a sensor, metres from lattice point 0.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Line {
-    pub(super) origin_m: Vector3<f64>,
-    /// Unit vector.
-    pub(super) direction: Vector3<f64>,
 }
 
 fn mark_bundles(
@@ -328,18 +319,6 @@ impl Rays<'_> {
     }
 }
 
-/// Handler of the cells that rays leave. A trait, since closures cannot be told to be compiled into their caller.
-trait Visit {
-    fn visit(&mut self, cell: Packed, place: &mut Place);
-}
-
-/// State of a ray besides its steps.
-struct Place {
-    cursor: Cursor,
-    end: Packed,
-    line: Option<Line>,
-}
-
 /// Marks cells as traversed.
 struct Marker<'a> {
     masks: &'a mut ScanMasks,
@@ -379,47 +358,4 @@ impl Prober<'_, '_> {
         let line = place.line.get_or_insert_with(line);
         self.probe.meet(self.masks, cell, &place.cursor, line);
     }
-}
-
-/// Steps along all rays, each given with its end; returns the number of visits.
-#[inline(always)]
-fn step_all<const P: usize>(
-    families: &Families<P>,
-    origin: &Origin<P>,
-    rays: impl Iterator<Item = (Ray<P>, Packed)>,
-    visitor: &mut impl Visit,
-) -> u64 {
-    let mut visits = 0;
-    let mut rays = rays.map(|(ray, end)| {
-        let (cursor, line) = (Cursor::NONE, None);
-        (ray, Place { cursor, end, line })
-    });
-    let mut lanes: Vec<(Ray<P>, Place)> = rays.by_ref().take(LANES).collect();
-    while let Ok(full) = <&mut [(Ray<P>, Place); LANES]>::try_from(lanes.as_mut_slice()) {
-        let mut ended = None;
-        for (i, (ray, place)) in full.iter_mut().enumerate() {
-            if let Some(cell) = families.step(origin, ray) {
-                visitor.visit(cell, place);
-                continue;
-            }
-            visits += ray.steps;
-            match rays.next() {
-                Some(next) => (*ray, place.end, place.line) = (next.0, next.1.end, None),
-                None => {
-                    ray.steps = 0;
-                    ended = Some(i);
-                }
-            }
-        }
-        if let Some(i) = ended {
-            lanes.swap_remove(i);
-        }
-    }
-    for (ray, place) in &mut lanes {
-        while let Some(cell) = families.step(origin, ray) {
-            visitor.visit(cell, place);
-        }
-        visits += ray.steps;
-    }
-    visits
 }

@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 
 use super::masks::{Cursor, Mask, ScanMasks};
 use super::packed::{Packed, difference};
-use super::scan::Line;
+use super::steps::Line;
 use crate::lattice::{Lattice, LatticeIndex, MortonKey};
 use crate::voxels::VoxelStore;
 

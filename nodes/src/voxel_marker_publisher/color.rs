@@ -40,6 +40,24 @@ mod tests {
     use super::*;
 
     #[test]
+    fn remainders_are_those_of_divisions() {
+        let slow = |z_m: f64, period_m: f64| {
+            let hue = 6.0 * (z_m / period_m).rem_euclid(1.0);
+            [0.0, 4.0, 2.0].map(|shift: f64| {
+                let k = (hue + shift).rem_euclid(6.0);
+                (0.15 + 0.8 * ((k - 3.0).abs() - 1.0).clamp(0.0, 1.0)) as f32
+            })
+        };
+        for i in -20_000..20_000 {
+            let z_m = f64::from(i) * 0.003_7 + if i % 7 == 0 { 0.0 } else { 1e-17 };
+            for period_m in [0.3, 12.0, 1e6] {
+                let ColorRGBA { r, g, b, .. } = of_height(z_m, period_m, 1.0);
+                assert_eq!([r, g, b], slow(z_m, period_m), "{z_m} of {period_m}");
+            }
+        }
+    }
+
+    #[test]
     fn hues_run_through_once_a_period() {
         let at = |z_m| of_height(z_m, 12.0, 1.0);
         assert_eq!(at(0.0), at(12.0));

@@ -263,3 +263,43 @@ fn a_list_without_stamps_cannot_forget_by_them() {
     let error = list.forget_before(0).unwrap_err().to_string();
     assert!(error.contains("stamps: true"), "{error}");
 }
+
+/// Up to a thousand changed voxels a step and ten thousand, which are listed and not.
+#[test]
+fn changes_of_a_large_list_are_what_differs() {
+    let lattice = Lattice::new(LatticeKind::Fcc, 0.125).unwrap();
+    let grid = |side: i16, shift: f32| -> Offsets {
+        let places = (0..side * side).map(|i| [i / side, i % side].map(|i| 0.6 * f32::from(i)));
+        places.map(|[x, y]| [x - 30.0, y - 30.0, shift]).collect()
+    };
+    let mut list = empty(&lattice, usize::MAX);
+    let mut before = BTreeMap::new();
+    for (step, (side, shift)) in [
+        (100, 0.0),
+        (3, 0.0),
+        (30, 2.0),
+        (100, 0.0),
+        (0, 0.0),
+        (1, 0.0),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        list.insert(&cloud(0, &grid(side, shift)));
+        let all = list.sorted_keys();
+        let removed = all.iter().skip(step).step_by(7 * step.max(1));
+        removed.for_each(|key| assert!(VoxelStore::remove(&mut list, *key)));
+        list.validate().unwrap();
+        let now = rows(&list);
+        let changes = list.take_changes();
+        let differs = |key: &&MortonKey| before.get(*key) != now.get(*key);
+        let changed: Vec<_> = now.keys().filter(differs).copied().collect();
+        let gone = before.keys().filter(|key| !now.contains_key(key));
+        assert_eq!(changes.changed, changed, "step {step}");
+        assert_eq!(changes.removed, gone.copied().collect::<Vec<_>>());
+        let voxels = list.get_all(&all);
+        let one_by_one = all.iter().map(|key| list.get(*key).unwrap_or_default());
+        assert!(voxels.into_iter().eq(one_by_one));
+        before = now;
+    }
+}

@@ -330,7 +330,7 @@ fn file_of(source: &Path, module: &[String]) -> std::path::PathBuf {
 /// Crates, and the number of their files that are in cycles. A number may fall, not rise.
 const CRATES: [(&str, usize); 7] = [
     ("msgs/src", 0),
-    ("lattice_core/src", 4),
+    ("lattice_core/src", 0),
     ("nodes/src", 0),
     ("nodes/runtime/src", 0),
     ("nodes/bag/src", 0),

@@ -1,6 +1,6 @@
 //! Optional columns of a list as bytes: stamps, labels and colours.
 
-use super::read::ColumnError;
+use super::column_error::ColumnError;
 use crate::voxels::codec::{Varints, push_varint, unzigzag, zigzag};
 use crate::voxels::store::payload_columns::Columns;
 use crate::voxels::{ColorSum, LabelCount, Stamps, Voxel};

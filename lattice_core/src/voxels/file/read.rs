@@ -2,16 +2,18 @@
 
 use std::io::{self, Read};
 
+use super::column_error::ColumnError;
 use super::column_values::{decode_colors, decode_labels, decode_stamps, expect, expect_end};
 use super::contents::no_columns;
 use super::head::{
     COLUMNS, COUNT, Codec, Column, KEYS, LABELS, OFFSET_SUM, SECTION_HEAD_BYTES, STAMPS,
     SectionHead, corrupt,
 };
+use super::options::{MAX_EXPANSION, MAX_WINDOW_LOG};
 use super::source::Source;
-use super::{FileError, MAX_EXPANSION, MAX_WINDOW_LOG, MapContents};
+use super::{FileError, MapContents};
 use crate::voxels::Voxel;
-use crate::voxels::codec::{CodecError, Varints, decode_keys, unzigzag};
+use crate::voxels::codec::{Varints, decode_keys, unzigzag};
 use crate::voxels::store::fixed_point::reach;
 
 impl MapContents {
@@ -131,46 +133,6 @@ impl MapContents {
             }
         }
         expect_end(&mut values)
-    }
-}
-
-/// Error in the values of a column, at the byte after it.
-pub(super) struct ColumnError {
-    offset: usize,
-    reason: String,
-}
-
-impl From<CodecError> for ColumnError {
-    fn from(error: CodecError) -> ColumnError {
-        // The CRC matches, so the error was written.
-        let (offset, reason) = match error {
-            CodecError::Truncated { position } => {
-                (position, "the values end within a number".to_owned())
-            }
-            CodecError::Varint { position } => (
-                position,
-                "a number is not a shortest 64-bit varint".to_owned(),
-            ),
-            CodecError::Key { index, position } => (
-                position,
-                format!("key {index} does not ascend or is not below 2^63"),
-            ),
-            CodecError::Count { value, position } => {
-                (position, format!("count {value} does not fit 32 bits"))
-            }
-            CodecError::TooMany { .. } => (0, "there are too many values".to_owned()),
-        };
-        ColumnError { offset, reason }
-    }
-}
-
-impl Varints<'_> {
-    /// Error at the position of the next value.
-    pub(super) fn error(&self, reason: String) -> ColumnError {
-        ColumnError {
-            offset: self.position(),
-            reason,
-        }
     }
 }
 

@@ -7,7 +7,8 @@ use super::head::{
     COLOR, COUNT, Codec, Column, END_TAG, Head, KEYS, LABELS, OFFSET_SUM, STAMPS, SectionHead,
 };
 use super::lattice_figures::orientation_error;
-use super::{FileError, MAX_EXPANSION, MapContents, WriteOptions};
+use super::options::{MAX_EXPANSION, WriteOptions};
+use super::{FileError, MapContents};
 use crate::voxels::codec::{encode_keys, push_varint, zigzag};
 
 impl MapContents {
