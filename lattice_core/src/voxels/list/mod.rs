@@ -148,30 +148,27 @@ impl VoxelList {
         Some(shard.voxel(code, entry))
     }
 
-    /// Voxels of cells, in the order of the keys; without points where a cell is not occupied.
-    ///
-    /// Cells are read in stages, so that the cache misses of one stage overlap.
+    /// Voxels of cells, in the order of the keys; without points where a cell is not occupied. They are read in stages,
+    /// so that the cache misses of one stage overlap.
     pub fn get_all(&self, keys: &[MortonKey]) -> Vec<Voxel> {
         let mut voxels = Vec::with_capacity(keys.len());
+        let (mut blocks, mut rows) = (Vec::new(), Vec::new());
         for keys in keys.chunks(BATCH) {
-            let mut places = [None; BATCH];
-            for (place, key) in places.iter_mut().zip(keys) {
+            blocks.extend(keys.iter().map(|key| {
                 let code = BlockKey::from(*key);
-                let shard = self.shard(code);
-                *place = shard.and_then(|shard| Some((shard, code, shard.voxels.block_of(code)?)));
-            }
-            for place in places.iter_mut().take(keys.len()) {
-                *place = place.and_then(|(shard, code, block)| {
-                    Some((shard, code, shard.voxels.find_in(block, code)?))
-                });
-            }
-            voxels.extend(places.iter().take(keys.len()).map(|place| {
-                let entry = place.and_then(|(shard, code, number)| {
-                    let entry = shard.voxels.rows().get(number as usize)?;
-                    Some(shard.voxel(code, entry))
-                });
-                entry.unwrap_or_default()
+                let shard = self.shard(code)?;
+                Some((shard, code, shard.voxels.block_of(code)?))
             }));
+            rows.extend(blocks.drain(..).map(|place| {
+                let (shard, code, block) = place?;
+                Some((shard, code, shard.voxels.find_in(block, code)?))
+            }));
+            let voxel = |(shard, code, number): (&Shard, BlockKey, u32)| {
+                let entry = shard.voxels.rows().get(number as usize)?;
+                Some(shard.voxel(code, entry))
+            };
+            let found = rows.drain(..).map(|row| row.and_then(voxel));
+            voxels.extend(found.map(Option::unwrap_or_default));
         }
         voxels
     }
