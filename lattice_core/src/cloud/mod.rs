@@ -4,7 +4,6 @@
 //! resulting [`CloudView`] reads points safely. [`transform_records`] transforms them to the map frame, each with the
 //! pose at its own time.
 
-mod block;
 mod coordinates;
 mod error;
 mod layout;
@@ -17,7 +16,6 @@ mod time_options;
 mod transform;
 mod view;
 
-pub use block::RangeLimits;
 pub use error::{CloudError, FittingUnit};
 pub use layout::{CloudLayout, CloudLimits, Datatype, PointField};
 pub use mend::LayoutNote;
@@ -25,7 +23,7 @@ pub use points::Cloud;
 pub use record::{Precision, RecordFormat, VIEWPOINT_FIELDS};
 pub use time::{NO_TIME_NS, PointTimes, TimeSource};
 pub use time_options::{TimeOptions, TimeReference, TimeUnit};
-pub use transform::{Records, transform_records};
+pub use transform::{RangeLimits, Records, transform_records};
 pub use view::CloudView;
 
 #[cfg(test)]

@@ -119,13 +119,9 @@ impl Copies {
         }
     }
 
-    /// Writes the fields of point `i` to the start of `out`; returns the remainder.
+    /// Writes the fields of a source record to the start of `out`; returns the remainder.
     #[inline]
-    pub fn write<'a>(&self, view: &CloudView<'_>, i: usize, mut out: &'a mut [u8]) -> &'a mut [u8] {
-        if self.parts.is_empty() {
-            return out;
-        }
-        let record = view.record(i);
+    pub fn write<'a>(&self, record: &[u8], mut out: &'a mut [u8]) -> &'a mut [u8] {
         for (source, width) in &self.parts {
             let Some(bytes) = record.get(source.clone()) else {
                 break;
@@ -149,18 +145,16 @@ pub(super) fn write_vector<'a, const IS_WIDE: bool>(
     v: &Vector3<f64>,
     out: &'a mut [u8],
 ) -> &'a mut [u8] {
-    if IS_WIDE {
-        write_numbers(v.map(f64::to_le_bytes).into(), out)
-    } else {
-        write_numbers(v.map(|v| (v as f32).to_le_bytes()).into(), out)
-    }
-}
-
-#[inline]
-fn write_numbers<const BYTES: usize>(numbers: [[u8; BYTES]; 3], out: &mut [u8]) -> &mut [u8] {
-    let Some((place, rest)) = out.split_at_mut_checked(3 * BYTES) else {
+    let size = if IS_WIDE { 8 } else { 4 };
+    let Some((place, rest)) = out.split_at_mut_checked(3 * size) else {
         return &mut [];
     };
-    place.copy_from_slice(numbers.as_flattened());
+    for (value, place) in v.iter().zip(place.chunks_exact_mut(size)) {
+        if IS_WIDE {
+            place.copy_from_slice(&value.to_le_bytes());
+        } else {
+            place.copy_from_slice(&(*value as f32).to_le_bytes());
+        }
+    }
     rest
 }

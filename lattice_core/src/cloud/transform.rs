@@ -1,12 +1,11 @@
 //! Deskewing: transforms every point to the map frame with the pose at its own time, from record to record in one
 //! pass.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
-use super::block::{Block, LANES, at};
 use super::record::{Copies, Precision, RecordFormat, write_vector};
-use super::{CloudView, NO_TIME_NS, RangeLimits};
+use super::{CloudView, NO_TIME_NS};
 
 /// Minimum number of points per task.
 const MIN_CHUNK: usize = 2048;
@@ -16,6 +15,26 @@ const CHUNKS_PER_THREAD: usize = 4;
 const MEMO_BITS: u32 = 15;
 /// Slot of a point without a time.
 const NO_SLOT: u32 = u32::MAX;
+
+/// Range limits in the sensor frame: `min_range_m < distance <= max_range_m`.
+///
+/// The origin of the sensor, which many drivers send for a missing return, is always dropped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RangeLimits {
+    /// Distance up to which points are dropped, metres.
+    pub min_range_m: f64,
+    /// Maximum distance, metres.
+    pub max_range_m: f64,
+}
+
+impl Default for RangeLimits {
+    fn default() -> RangeLimits {
+        RangeLimits {
+            min_range_m: 0.0,
+            max_range_m: f64::INFINITY,
+        }
+    }
+}
 
 /// Transformed records in the order of the cloud, and the numbers of dropped points.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,32 +79,12 @@ pub fn transform_records<E: Send>(
         lookup: |i| time_of(i).map(&map_from_sensor).transpose(),
     };
     let shared = times.is_none().then(|| map_from_sensor(stamp_ns).ok());
-    if let Some(shared) = shared.flatten().filter(|_| !view.is_empty()) {
-        return source.records(format, &Known::Shared(shared));
+    if let Some(shared) = shared.filter(|_| !view.is_empty()) {
+        return source.records(format, |_| shared.as_ref());
     }
     match times.and_then(|times| Memo::new(times, &map_from_sensor)) {
-        Some(memo) => source.records(format, &Known::Repeated(memo)),
-        None => source.records(format, &Known::Nothing),
-    }
-}
-
-/// Poses looked up before.
-enum Known {
-    /// Pose of all points.
-    Shared(Isometry3<f64>),
-    /// Poses of repeated times.
-    Repeated(Memo),
-    Nothing,
-}
-
-impl Known {
-    #[inline]
-    fn pose(&self, i: usize) -> Option<&Isometry3<f64>> {
-        match self {
-            Known::Shared(pose) => Some(pose),
-            Known::Repeated(memo) => memo.pose(i),
-            Known::Nothing => None,
-        }
+        Some(memo) => source.records(format, |i| memo.pose(i)),
+        None => source.records(format, |_| None),
     }
 }
 
@@ -113,21 +112,24 @@ impl<'a, E: Send, L> Source<'a, L>
 where
     L: Fn(usize) -> Result<Option<Isometry3<f64>>, E> + Sync,
 {
-    /// Transforms the points.
-    fn records(&self, format: &RecordFormat, known: &Known) -> Result<Records, E> {
+    /// Transforms the points; `known` returns poses looked up before.
+    fn records<'p>(
+        &self,
+        format: &RecordFormat,
+        known: impl Fn(usize) -> Option<&'p Isometry3<f64>> + Sync,
+    ) -> Result<Records, E> {
         let write = |precision: Precision| {
             let (_, bytes) = format.fields(precision);
             match precision {
-                Precision::Float32 => self.write::<false>(bytes, known),
-                Precision::Float64 => self.write::<true>(bytes, known),
+                Precision::Float32 => self.write::<false>(bytes, &known),
+                Precision::Float64 => self.write::<true>(bytes, &known),
             }
         };
         if let Some(precision) = format.precision {
             return write(precision).map(|(records, _)| records);
         }
         // The position of the sensor nearly always predicts whether some point requires double precision.
-        let pose = known
-            .pose(0)
+        let pose = known(0)
             .copied()
             .or_else(|| (self.lookup)(0).ok().flatten());
         let first = pose.map(|pose| Precision::for_point(&pose.translation.vector));
@@ -140,10 +142,10 @@ where
     }
 
     /// Records of `bytes` bytes each, and the precision that their points require.
-    fn write<const IS_WIDE: bool>(
+    fn write<'p, const IS_WIDE: bool>(
         &self,
         bytes: usize,
-        known: &Known,
+        known: &(impl Fn(usize) -> Option<&'p Isometry3<f64>> + Sync),
     ) -> Result<(Records, Precision), E> {
         let points = self.view.len();
         let threads = rayon::current_num_threads();
@@ -188,88 +190,52 @@ where
     }
 
     /// Writes the records of the points from `first` on to `out`, which has space for all.
-    fn write_part<const IS_WIDE: bool>(
+    fn write_part<'p, const IS_WIDE: bool>(
         &self,
         first: usize,
         bytes: usize,
         out: &mut [u8],
-        known: &Known,
+        known: &impl Fn(usize) -> Option<&'p Isometry3<f64>>,
     ) -> Result<Counts, E> {
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: AVX2 was detected.
-            #[allow(unsafe_code)]
-            return unsafe { self.write_part_avx2::<IS_WIDE>(first, bytes, out, known) };
-        }
-        self.write_blocks::<IS_WIDE>(first, bytes, out, known)
-    }
-
-    /// [`Self::write_blocks`] with 256-bit vectors: the same operations in the same order, hence the same bits.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn write_part_avx2<const IS_WIDE: bool>(
-        &self,
-        first: usize,
-        bytes: usize,
-        out: &mut [u8],
-        known: &Known,
-    ) -> Result<Counts, E> {
-        self.write_blocks::<IS_WIDE>(first, bytes, out, known)
-    }
-
-    #[inline(always)]
-    fn write_blocks<const IS_WIDE: bool>(
-        &self,
-        first: usize,
-        bytes: usize,
-        out: &mut [u8],
-        known: &Known,
-    ) -> Result<Counts, E> {
-        let end = first + out.len() / bytes;
+        let range = self.range;
+        let indices = first..first + out.len() / bytes;
         let mut counts = Counts::default();
         let mut places = out.chunks_exact_mut(bytes);
-        let mut block = Block::default();
-        if let Known::Shared(pose) = known {
-            (0..LANES).for_each(|lane| block.set_pose(lane, pose));
-        }
-        for start in (first..end).step_by(LANES) {
-            let lanes = LANES.min(end - start);
-            self.view.read(start, lanes, &mut block.points_m);
-            block.measure();
-            let (finite, in_range) = block.outcomes(lanes, self.range);
-            counts.not_finite += lanes - finite.count_ones() as usize;
-            counts.out_of_range += (finite & !in_range).count_ones() as usize;
-            let mut kept = finite & in_range;
-            if !matches!(known, Known::Shared(_)) {
-                for lane in 0..lanes {
-                    if kept & (1 << lane) == 0 {
-                        continue;
-                    }
-                    let i = start + lane;
-                    if let Some(pose) = known.pose(i) {
-                        block.set_pose(lane, pose);
-                    } else if let Some(pose) = (self.lookup)(i)? {
-                        block.set_pose(lane, &pose);
-                    } else {
+        for i in indices {
+            let record = self.view.record(i);
+            let p = self.view.xyz_of(record);
+            let distance_m = p.norm();
+            if !distance_m.is_finite() {
+                counts.not_finite += 1;
+                continue;
+            }
+            if !(distance_m > range.min_range_m && distance_m <= range.max_range_m) {
+                counts.out_of_range += 1;
+                continue;
+            }
+            let looked_up;
+            let pose = match known(i) {
+                Some(pose) => pose,
+                None => {
+                    let Some(pose) = (self.lookup)(i)? else {
                         counts.no_time += 1;
-                        kept &= !(1 << lane);
-                    }
+                        continue;
+                    };
+                    looked_up = pose;
+                    &looked_up
                 }
+            };
+            let moved = (pose * Point3::from(p)).coords;
+            counts.is_far |= Precision::for_point(&moved) == Precision::Float64;
+            let Some(place) = places.next() else {
+                break;
+            };
+            let further = write_vector::<IS_WIDE>(&moved, place);
+            let further = self.copies.write(record, further);
+            if self.with_viewpoints {
+                write_vector::<IS_WIDE>(&pose.translation.vector, further);
             }
-            block.transform();
-            for (lane, place) in (0..lanes)
-                .filter(|lane| kept & (1 << lane) != 0)
-                .zip(&mut places)
-            {
-                let moved = at(&block.moved_m, lane);
-                counts.is_far |= Precision::for_point(&moved) == Precision::Float64;
-                let further = write_vector::<IS_WIDE>(&moved, place);
-                let further = self.copies.write(self.view, start + lane, further);
-                if self.with_viewpoints {
-                    write_vector::<IS_WIDE>(&at(&block.translation_m, lane), further);
-                }
-                counts.kept += 1;
-            }
+            counts.kept += 1;
         }
         Ok(counts)
     }

@@ -2,7 +2,6 @@
 
 use nalgebra::Vector3;
 
-use super::block::{LANES, Lanes};
 use super::coordinates::Coordinates;
 use super::{CloudError, CloudLayout, CloudLimits, Datatype, PointField};
 
@@ -93,30 +92,6 @@ impl<'a> CloudView<'a> {
         };
         let at = |offset| self.number_of(record, datatype, offset);
         Vector3::new(at(x), at(y), at(z))
-    }
-
-    /// Reads the coordinates of `lanes` points from `first` on, metres; the lanes behind them keep what they hold.
-    #[inline(always)]
-    pub(super) fn read(&self, first: usize, lanes: usize, out: &mut [Lanes; 3]) {
-        let [x, y, z] = out;
-        let step = self.point_step;
-        let [at, ..] = self.coordinates.offsets;
-        let records = self
-            .data
-            .get(first.saturating_mul(step).saturating_add(at)..);
-        if let Some(records) = records.filter(|_| self.is_plain() && first + lanes <= self.points) {
-            for lane in 0..lanes.min(LANES) {
-                let record = records.get(lane * step..);
-                let Some([a, b, c]) = record.and_then(<[u8]>::first_chunk::<12>).map(floats) else {
-                    break;
-                };
-                (x[lane], y[lane], z[lane]) = (f64::from(a), f64::from(b), f64::from(c));
-            }
-            return;
-        }
-        for lane in 0..lanes.min(LANES) {
-            [x[lane], y[lane], z[lane]] = self.xyz(first + lane).into();
-        }
     }
 
     /// True if points follow each other without gaps between rows, and have consecutive little-endian `f32` coordinates.
