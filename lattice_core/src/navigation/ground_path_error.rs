@@ -9,7 +9,7 @@ use super::options::ProjectionError;
 pub enum PathEnd {
     /// The robot.
     Start,
-    /// Where it is to go.
+    /// Destination.
     Goal,
 }
 
