@@ -7,7 +7,7 @@ use rustc_hash::FxHashSet;
 
 use super::blocks::{Blocks, CELLS, add_evidence, apply_to_hit};
 use super::evidence::Steps;
-use super::masks::{Cursor, Mask, ScanMasks};
+use super::masks::{Mask, ScanMasks};
 use super::packed::{Packed, difference};
 use crate::lattice::{Lattice, LatticeError, LatticeIndex, MortonKey};
 
@@ -92,13 +92,12 @@ impl Coarse {
         self.masks.clear();
         let mut blocks: Vec<_> = scan.blocks().collect();
         blocks.sort_unstable_by_key(|(block, ..)| *block);
-        let mut cursor = Cursor::NONE;
         for &(block, _, hit) in &blocks {
             let base = self.base(block);
             for w in (hit.places()).flat_map(|place| self.overlaps.get(place).into_iter().flatten())
             {
                 if let Some(cell) = Packed::new(offset(base, *w)) {
-                    self.masks.hit(cell, &mut cursor);
+                    self.masks.hit(cell);
                 }
             }
         }
@@ -107,7 +106,7 @@ impl Coarse {
                 continue;
             };
             for home in passed.places().filter_map(|place| self.belongs.get(place)) {
-                self.masks.pass(base.plus(difference(*home)), &mut cursor);
+                self.masks.pass(base.plus(difference(*home)));
             }
         }
     }

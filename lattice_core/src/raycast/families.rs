@@ -1,6 +1,7 @@
 //! Planes between neighbouring cells, and the inner loop of the ray traversal.
 
 use nalgebra::{Matrix3, Vector3};
+use wide::f64x2;
 
 use super::packed::{self, Packed};
 use crate::lattice::{Lattice, LatticeIndex};
@@ -20,8 +21,9 @@ const LAST: f64 = 1.0 - 1.0 / (1_u64 << 48) as f64;
 /// Component of a ray per plane spacing below which it does not cross the planes.
 const PARALLEL: f64 = 1.0 / (1_u64 << 50) as f64;
 
-/// Change of state at the crossing of a face.
+/// Change of state at the crossing of a face, in whole cache lines.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 struct Crossing<const P: usize> {
     /// Addend to the numerators: Gram products with the vector of the face.
     add: [f64; P],
@@ -90,7 +92,7 @@ impl<const P: usize> Families<P> {
         let mut walk = Walk {
             q: [NEVER; P],
             inverse: [1.0; P],
-            tag: [0; P],
+            tag: [0.0; P],
             cell: origin.cell,
         };
         for j in 0..P {
@@ -100,7 +102,7 @@ impl<const P: usize> Families<P> {
             let q = sign * self.half_squares[j] - origin.along[j];
             walk.q[j] = if crosses { q } else { NEVER };
             walk.inverse[j] = if crosses { 1.0 / along } else { 1.0 };
-            walk.tag[j] = 2 * j as u64 + u64::from(along < 0.0);
+            walk.tag[j] = f64::from_bits(2 * j as u64 + u64::from(along < 0.0));
         }
         walk
     }
@@ -166,7 +168,8 @@ pub(super) struct Origin<const P: usize> {
 pub(super) struct Walk<const P: usize> {
     q: [f64; P],
     inverse: [f64; P],
-    tag: [u64; P],
+    /// Face indices as bits.
+    tag: [f64; P],
     pub(super) cell: Packed,
 }
 
@@ -175,8 +178,20 @@ pub(super) struct Walk<const P: usize> {
 pub(super) struct Ray<const P: usize> {
     pub(super) walk: Walk<P>,
     pub(super) steps: u64,
-    /// Upper bound of the steps.
+    /// Upper bound of the steps; 0 for a ray without steps.
     pub(super) limit: u64,
+}
+
+impl<const P: usize> Ray<P> {
+    /// Makes a ray that has no steps.
+    pub(super) fn end(&mut self) {
+        (self.steps, self.limit) = (0, 0);
+        self.walk.end();
+    }
+
+    pub(super) fn has_ended(&self) -> bool {
+        self.limit == 0
+    }
 }
 
 impl<const P: usize> Walk<P> {
@@ -188,24 +203,19 @@ impl<const P: usize> Walk<P> {
     /// Parameter at which the ray leaves its cell; its low bits are the face index.
     #[inline(always)]
     fn next_exit(&self) -> f64 {
-        let mut t = [0.0; P];
-        for (j, t) in t.iter_mut().enumerate() {
-            let exact = self.q[j] * self.inverse[j];
-            *t = f64::from_bits(exact.to_bits() & !TAG | self.tag[j]);
-        }
         // Two lanes throughout, so that SSE2 suffices.
-        let mut least = [t[0], t[1]];
-        for pair in t.chunks_exact(2).skip(1) {
-            least = [lesser(least[0], pair[0]), lesser(least[1], pair[1])];
+        let untagged = f64x2::splat(f64::from_bits(!TAG));
+        let pair = |j: usize| {
+            let two = |values: &[f64; P]| f64x2::new([values[j], values[j + 1]]);
+            two(&self.q) * two(&self.inverse) & untagged | two(&self.tag)
+        };
+        let mut least = pair(0);
+        for j in (2..P).step_by(2) {
+            least = least.fast_min(pair(j));
         }
-        lesser(least[0], least[1])
+        let [a, b] = least.to_array();
+        if a < b { a } else { b }
     }
-}
-
-/// Minimum of two numbers in one instruction.
-#[inline(always)]
-fn lesser(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
 }
 
 /// One face vector of each pair `+-n` of a lattice.

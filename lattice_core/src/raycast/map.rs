@@ -7,7 +7,7 @@ use super::clear::{ClearReport, traversed_voxels};
 use super::coarse::Coarse;
 use super::evidence::{Evidence, Steps, UNKNOWN};
 use super::free_space_options::{FreeSpaceError, FreeSpaceOptions};
-use super::masks::{Cursor, Mask, ScanMasks};
+use super::masks::{Mask, ScanMasks};
 use super::packed::Packed;
 use super::scan::{self, RayBundle, Reach, ScanReport};
 use super::surface::{Probe, Surfaces};
@@ -134,8 +134,9 @@ impl FreeSpaceMap {
             traversed.iter().for_each(|cell| self.masks.spare(*cell));
             let passed = self.surfaces.passed();
             kept -= passed.len();
-            let mut cursor = Cursor::NONE;
-            (passed.iter()).for_each(|cell| self.masks.pass(*cell, &mut cursor));
+            for cell in passed {
+                self.masks.pass(*cell);
+            }
         }
         let missed = |(_, passed, hit): (u64, &Mask, &Mask)| -> u64 {
             let words = passed.without(hit).0;
@@ -195,10 +196,9 @@ impl FreeSpaceMap {
     /// Adds one hit to each cell, such as those of a loaded map.
     pub fn insert_occupied(&mut self, keys: &[MortonKey]) {
         for part in keys.chunks(SEED_CELLS) {
-            let mut cursor = Cursor::NONE;
             self.masks.clear();
             for cell in part.iter().filter_map(|key| Packed::new(key.unpack())) {
-                self.masks.hit(cell, &mut cursor);
+                self.masks.hit(cell);
             }
             self.apply_marks();
         }

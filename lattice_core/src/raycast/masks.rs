@@ -69,73 +69,53 @@ fn random_multiplier() -> u64 {
     RandomState::new().hash_one(0) | 1
 }
 
-/// Slot of a hash in a table with a power of two of slots.
-#[inline(always)]
-fn spread(block: u64, multiplier: u64, bits: u32) -> usize {
-    // The low three bits of a block are zero, so both halves are rotated.
-    let mixed = (block ^ block >> 32).wrapping_mul(multiplier);
-    (mixed >> (64 - bits)) as usize
-}
-
+/// Entry of a table of blocks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Entry {
-    block: u64,
+    /// Block, with the stamp of a scan in place of a position; the entry is empty if the stamp differs.
+    tag: u64,
     slot: u32,
-    /// Stamp of the scan; the entry is empty if it differs.
-    stamp: u32,
 }
 
 /// Blocks of one scan; cleared in constant time.
+///
+/// A cell's block is looked up at each step of a ray: a branch for "still in the same block" could not be predicted.
 #[derive(Clone, Debug)]
 pub(super) struct ScanMasks {
+    /// Open addressing, at most a quarter full, so that the first place is nearly always the right one.
     table: Vec<Entry>,
-    bits: u32,
+    /// 64 less the bits of a place in the table.
+    shift: u32,
     multiplier: u64,
-    stamp: u32,
+    /// Position in a block, packed; never 0.
+    stamp: Packed,
     /// Masks by slot; slot 0 collects the cells of refused blocks.
     blocks: Vec<u64>,
     passed: Vec<Mask>,
     hit: Vec<Mask>,
     most: usize,
-    entries_refused: u64,
-}
-
-/// Block of the last cell; a ray stays in one for several cells.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Cursor {
-    block: u64,
-    pub(super) slot: usize,
-}
-
-impl Cursor {
-    /// No block: the low bits of a block are zero.
-    pub(super) const NONE: Cursor = Cursor { block: 1, slot: 0 };
-
-    #[inline(always)]
-    pub(super) fn is_in_block_of(&self, cell: Packed) -> bool {
-        cell.block() == self.block
-    }
+    refusals: u64,
 }
 
 impl ScanMasks {
     pub(super) fn new(most: usize) -> ScanMasks {
-        let bits = 8;
         ScanMasks {
-            table: vec![Entry::default(); 1 << bits],
-            bits,
+            table: vec![Entry::default(); 1 << 8],
+            shift: 64 - 8,
             multiplier: random_multiplier(),
-            stamp: 1,
+            stamp: Packed::at(0, 1),
             blocks: vec![1],
             passed: vec![Mask::default()],
             hit: vec![Mask::default()],
             most: most.min(u32::MAX as usize - 1),
-            entries_refused: 0,
+            refusals: 0,
         }
     }
 
-    /// Maximum memory per block, bytes: twice masks and block for the growth of vectors, and a table at least 3/8
-    /// full beside the one that it replaces.
-    pub(super) const BYTES_PER_BLOCK: usize = 2 * (2 * size_of::<Mask>() + 8) + 4 * 16;
+    /// Maximum memory per block, bytes: twice masks and block for the growth of vectors, and a table at least an eighth
+    /// full.
+    pub(super) const BYTES_PER_BLOCK: usize =
+        2 * (2 * size_of::<Mask>() + 8) + 8 * size_of::<Entry>();
 
     pub(super) fn bytes(&self) -> usize {
         self.table.capacity() * size_of::<Entry>()
@@ -147,17 +127,17 @@ impl ScanMasks {
         self.blocks.truncate(1);
         self.passed.truncate(1);
         self.hit.truncate(1);
-        self.entries_refused = 0;
-        self.stamp = self.stamp.wrapping_add(1);
-        if self.stamp == 0 {
+        self.refusals = 0;
+        self.stamp = Packed::at(0, (self.stamp.place() + 1) & 0o777);
+        if self.stamp.place() == 0 {
             self.table.fill(Entry::default());
-            self.stamp = 1;
+            self.stamp = Packed::at(0, 1);
         }
     }
 
-    /// Number of times that a ray or end entered a block refused for lack of memory.
-    pub(super) fn entries_refused(&self) -> u64 {
-        self.entries_refused
+    /// Number of cells of rays and ends in blocks refused for lack of memory.
+    pub(super) fn refusals(&self) -> u64 {
+        self.refusals
     }
 
     /// Every block with its traversed and its hit cells.
@@ -167,36 +147,34 @@ impl ScanMasks {
         blocks.map(|(block, (passed, hit))| (*block, passed, hit))
     }
 
+    /// Marks a cell as traversed; returns the slot of its block, and its place there.
     #[inline(always)]
-    pub(super) fn pass(&mut self, cell: Packed, cursor: &mut Cursor) {
-        if !cursor.is_in_block_of(cell) {
-            *cursor = self.enter(cell.block());
+    pub(super) fn pass(&mut self, cell: Packed) -> (usize, usize) {
+        let (slot, place) = (self.slot_of(cell), cell.place());
+        if let Some(mask) = self.passed.get_mut(slot) {
+            mask.set(place);
         }
-        if let Some(mask) = self.passed.get_mut(cursor.slot) {
-            mask.set(cell.place());
-        }
+        (slot, place)
     }
 
     /// Takes the mark of a traversed cell back.
     pub(super) fn spare(&mut self, cell: Packed) {
-        let mask = self.find(cell.block()).filter(|slot| *slot != 0);
-        if let Some(mask) = mask.and_then(|slot| self.passed.get_mut(slot)) {
+        let slot = self.find(cell).ok();
+        if let Some(mask) = slot.and_then(|slot| self.passed.get_mut(slot)) {
             mask.remove(cell.place());
         }
     }
 
     /// Marks a cell as hit; true if it was not yet, or if its block is refused.
     #[inline]
-    pub(super) fn hit(&mut self, cell: Packed, cursor: &mut Cursor) -> bool {
-        if !cursor.is_in_block_of(cell) {
-            *cursor = self.enter(cell.block());
-        }
-        let new = self.hit.get_mut(cursor.slot);
-        new.is_some_and(|mask| mask.set(cell.place())) || cursor.slot == 0
+    pub(super) fn hit(&mut self, cell: Packed) -> bool {
+        let slot = self.slot_of(cell);
+        let new = self.hit.get_mut(slot);
+        new.is_some_and(|mask| mask.set(cell.place())) || slot == 0
     }
 
     pub(super) fn is_hit(&self, cell: Packed) -> bool {
-        let mask = self.find(cell.block()).and_then(|slot| self.hit.get(slot));
+        let mask = self.find(cell).ok().and_then(|slot| self.hit.get(slot));
         mask.is_some_and(|mask| mask.has(cell.place()))
     }
 
@@ -206,78 +184,82 @@ impl ScanMasks {
         blocks.map(|(block, hit)| (*block, hit))
     }
 
-    fn find(&self, block: u64) -> Option<usize> {
-        let mask = self.table.len() - 1;
-        let mut at = spread(block, self.multiplier, self.bits);
-        loop {
-            let entry = self.table.get(at)?;
-            if entry.stamp != self.stamp {
-                return None;
-            }
-            if entry.block == block {
-                return Some(entry.slot as usize);
-            }
-            at = (at + 1) & mask;
-        }
+    fn tag(&self, block: u64) -> u64 {
+        block | self.stamp.0
     }
 
-    /// Slot of a block, created if missing. Kept out of the inner loop, which is compiled into its caller then.
-    #[inline(never)]
-    pub(super) fn enter(&mut self, block: u64) -> Cursor {
-        let mask = self.table.len() - 1;
-        let mut at = spread(block, self.multiplier, self.bits);
+    /// First place of a block in the table.
+    #[inline(always)]
+    fn place(&self, tag: u64) -> usize {
+        // Folded, since neighbouring blocks differ in few bits, which some multipliers bring to the same places.
+        let folded = tag ^ tag >> 32;
+        (folded.wrapping_mul(self.multiplier) >> self.shift) as usize
+    }
+
+    /// Slot of the block of a cell, or the place in the table where it is missing.
+    #[inline(always)]
+    fn find(&self, cell: Packed) -> Result<usize, usize> {
+        let tag = self.tag(cell.block());
+        let mut at = self.place(tag);
         while let Some(entry) = self.table.get(at) {
-            if entry.stamp != self.stamp {
+            if entry.tag == tag {
+                return Ok(entry.slot as usize);
+            }
+            if !self.is_taken(entry) {
                 break;
             }
-            if entry.block == block {
-                let slot = entry.slot as usize;
-                return Cursor { block, slot };
-            }
-            at = (at + 1) & mask;
+            at = (at + 1) & (self.table.len() - 1);
         }
-        self.add(block, at)
+        Err(at)
+    }
+
+    fn is_taken(&self, entry: &Entry) -> bool {
+        Packed(entry.tag).place() == self.stamp.place()
+    }
+
+    /// Slot of the block of a cell, created if missing; 0 if it is refused.
+    #[inline(always)]
+    pub(super) fn slot_of(&mut self, cell: Packed) -> usize {
+        match self.find(cell) {
+            Ok(slot) => slot,
+            Err(at) => self.add(cell.block(), at),
+        }
     }
 
     #[inline(never)]
-    fn add(&mut self, block: u64, at: usize) -> Cursor {
+    fn add(&mut self, block: u64, at: usize) -> usize {
         let slot = self.blocks.len();
         if slot > self.most {
-            self.entries_refused += 1;
-            return Cursor { block, slot: 0 };
+            self.refusals += 1;
+            return 0;
         }
         self.blocks.push(block);
         self.passed.push(Mask::default());
         self.hit.push(Mask::default());
+        let tag = self.tag(block);
         if let Some(entry) = self.table.get_mut(at) {
-            *entry = Entry {
-                block,
-                slot: slot as u32,
-                stamp: self.stamp,
-            };
+            let slot = slot as u32;
+            *entry = Entry { tag, slot };
         }
-        if self.blocks.len() * 2 > self.table.len() {
+        if self.blocks.len() * 4 > self.table.len() {
             self.grow();
         }
-        Cursor { block, slot }
+        slot
     }
 
     fn grow(&mut self) {
-        self.bits += 1;
-        let mask = (1 << self.bits) - 1;
+        self.shift -= 1;
+        let places = 2 * self.table.len();
         self.table.clear();
-        self.table.resize(mask + 1, Entry::default());
-        for (slot, &block) in self.blocks.iter().enumerate().skip(1) {
-            let mut at = spread(block, self.multiplier, self.bits);
-            while self.table.get(at).is_some_and(|e| e.stamp == self.stamp) {
-                at = (at + 1) & mask;
+        self.table.resize(places, Entry::default());
+        for (slot, &block) in (0..).zip(&self.blocks).skip(1) {
+            let tag = self.tag(block);
+            let mut at = self.place(tag);
+            while self.table.get(at).is_some_and(|entry| entry.tag != 0) {
+                at = (at + 1) & (places - 1);
             }
             if let Some(entry) = self.table.get_mut(at) {
-                *entry = Entry {
-                    block,
-                    slot: slot as u32,
-                    stamp: self.stamp,
-                };
+                *entry = Entry { tag, slot };
             }
         }
     }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use rustc_hash::FxHashSet;
 
 use super::families::{Families, Origin, Ray};
-use super::masks::{Cursor, ScanMasks};
+use super::masks::ScanMasks;
 use super::packed::Packed;
 use super::steps::{Line, Place, Visit, step_all};
 use super::surface::Probe;
@@ -42,7 +42,7 @@ pub struct ScanReport {
     pub misses: u64,
     /// New blocks of 512 cells refused for lack of memory.
     pub blocks_refused: u64,
-    /// Number of times that a ray or end entered a block without memory during the scan.
+    /// Cells of rays and ends that lie in blocks without memory during the scan, counted for each ray.
     pub entries_refused: u64,
 }
 
@@ -136,20 +136,19 @@ fn mark_bundles(
             .sum()
     };
     report.visits = follow(masks, &ends);
-    if masks.entries_refused() > 0 {
+    if masks.refusals() > 0 {
         // The choice of refused blocks must not depend on the order of the points: repeat with complete, sorted ends.
         masks.clear();
-        let mut cursor = Cursor::NONE;
         for (rays, ends) in bundles.iter().zip(&mut ends) {
             ends.hits = rays.all_hits();
-            ends.hits.retain(|cell| masks.hit(*cell, &mut cursor));
+            ends.hits.retain(|cell| masks.hit(*cell));
             ends.open.sort_unstable();
         }
         report.visits = follow(masks, &ends);
     }
     report.hits = ends.iter().map(|ends| ends.hits.len() as u64).sum();
     report.rays = report.hits + ends.iter().map(|ends| ends.open.len() as u64).sum::<u64>();
-    report.entries_refused = masks.entries_refused();
+    report.entries_refused = masks.refusals();
 }
 
 /// Rays of one bundle, in metres from lattice point 0.
@@ -164,7 +163,7 @@ struct Rays<'a> {
 
 impl Rays<'_> {
     fn ends(&self, masks: &mut ScanMasks, report: &mut ScanReport) -> Ends {
-        let (mut hits, mut cursor) = (Vec::new(), Cursor::NONE);
+        let mut hits = Vec::new();
         let mut open = FxHashSet::default();
         let reach_square = self.reach.max_range_m * self.reach.max_range_m;
         self.quantize_each(|p, cell| {
@@ -174,7 +173,7 @@ impl Rays<'_> {
                 report.not_finite += 1;
             } else if square <= reach_square {
                 match cell {
-                    Some(cell) if masks.hit(cell, &mut cursor) => hits.push(cell),
+                    Some(cell) if masks.hit(cell) => hits.push(cell),
                     Some(_) => {}
                     None => report.out_of_range += 1,
                 }
@@ -326,8 +325,8 @@ struct Marker<'a> {
 
 impl Visit for Marker<'_> {
     #[inline(always)]
-    fn visit(&mut self, cell: Packed, place: &mut Place) {
-        self.masks.pass(cell, &mut place.cursor);
+    fn visit(&mut self, cell: Packed, _place: &mut Place) {
+        self.masks.pass(cell);
     }
 }
 
@@ -341,21 +340,18 @@ struct Prober<'a, 'p> {
 impl Visit for Prober<'_, '_> {
     #[inline(always)]
     fn visit(&mut self, cell: Packed, place: &mut Place) {
-        if !place.cursor.is_in_block_of(cell) {
-            self.probe.enter(self.masks, cell, &mut place.cursor);
-        }
-        self.masks.pass(cell, &mut place.cursor);
-        if self.probe.is_open(cell, &place.cursor) {
-            self.meet(cell, place);
+        let (slot, at) = self.masks.pass(cell);
+        if self.probe.is_open(self.masks, slot, at) {
+            self.meet(cell, slot, place);
         }
     }
 }
 
 impl Prober<'_, '_> {
     #[inline(never)]
-    fn meet(&mut self, cell: Packed, place: &mut Place) {
+    fn meet(&mut self, cell: Packed, slot: usize, place: &mut Place) {
         let line = || self.bundle.line(self.probe, place.end);
         let line = place.line.get_or_insert_with(line);
-        self.probe.meet(self.masks, cell, &place.cursor, line);
+        self.probe.meet(self.masks, cell, slot, line);
     }
 }

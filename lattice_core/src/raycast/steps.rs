@@ -3,7 +3,6 @@
 use nalgebra::Vector3;
 
 use super::families::{Families, Origin, Ray};
-use super::masks::Cursor;
 use super::packed::Packed;
 
 /// Number of rays that are followed in turn.
@@ -24,7 +23,6 @@ pub(super) trait Visit {
 
 /// State of a ray besides its steps.
 pub(super) struct Place {
-    pub(super) cursor: Cursor,
     pub(super) end: Packed,
     pub(super) line: Option<Line>,
 }
@@ -38,14 +36,11 @@ pub(super) fn step_all<const P: usize>(
     visitor: &mut impl Visit,
 ) -> u64 {
     let mut visits = 0;
-    let mut rays = rays.map(|(ray, end)| {
-        let (cursor, line) = (Cursor::NONE, None);
-        (ray, Place { cursor, end, line })
-    });
+    let mut rays = rays.map(|(ray, end)| (ray, Place { end, line: None }));
     let mut lanes: Vec<(Ray<P>, Place)> = rays.by_ref().take(LANES).collect();
     while let Ok(full) = <&mut [(Ray<P>, Place); LANES]>::try_from(lanes.as_mut_slice()) {
-        let mut ended = None;
-        for (i, (ray, place)) in full.iter_mut().enumerate() {
+        let mut has_ended = false;
+        for (ray, place) in full {
             if let Some(cell) = families.step(origin, ray) {
                 visitor.visit(cell, place);
                 continue;
@@ -54,13 +49,13 @@ pub(super) fn step_all<const P: usize>(
             match rays.next() {
                 Some(next) => (*ray, place.end, place.line) = (next.0, next.1.end, None),
                 None => {
-                    ray.steps = 0;
-                    ended = Some(i);
+                    ray.end();
+                    has_ended = true;
                 }
             }
         }
-        if let Some(i) = ended {
-            lanes.swap_remove(i);
+        if has_ended {
+            lanes.retain(|(ray, _)| !ray.has_ended());
         }
     }
     for (ray, place) in &mut lanes {

@@ -5,7 +5,7 @@ use std::collections::hash_map::Entry;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rustc_hash::FxHashMap;
 
-use super::masks::{Cursor, Mask, ScanMasks};
+use super::masks::{Mask, ScanMasks};
 use super::packed::{Packed, difference};
 use super::steps::Line;
 use crate::lattice::{Lattice, LatticeIndex, MortonKey};
@@ -104,11 +104,18 @@ impl<'a> Probe<'a> {
         self.surfaces.passed.clear();
     }
 
-    /// Moves a cursor to the block of a cell, whose voxels are read from the store once a scan. All hits of the scan are
-    /// marked.
+    /// True for a voxel, by slot and place, that is not hit and may yet be passed through. All hits of the scan are marked.
+    #[inline(always)]
+    pub(super) fn is_open(&mut self, masks: &ScanMasks, slot: usize, place: usize) -> bool {
+        match self.surfaces.open.get(slot) {
+            Some(mask) => mask.has(place),
+            None => self.read(masks, slot, place),
+        }
+    }
+
+    /// Reads the voxels of new blocks from the store.
     #[inline(never)]
-    pub(super) fn enter(&mut self, masks: &mut ScanMasks, cell: Packed, cursor: &mut Cursor) {
-        *cursor = masks.enter(cell.block());
+    fn read(&mut self, masks: &ScanMasks, slot: usize, place: usize) -> bool {
         let open = &mut self.surfaces.open;
         for (slot, (block, hit)) in (open.len()..).zip(masks.blocks_from(open.len())) {
             open.push(match slot {
@@ -117,13 +124,7 @@ impl<'a> Probe<'a> {
                 _ => Mask::of_voxels(self.store, block).without(hit),
             });
         }
-    }
-
-    /// True for a voxel of an entered block that is not hit and may yet be passed through.
-    #[inline(always)]
-    pub(super) fn is_open(&self, cell: Packed, cursor: &Cursor) -> bool {
-        let open = self.surfaces.open.get(cursor.slot);
-        open.is_some_and(|mask| mask.has(cell.place()))
+        open.get(slot).is_some_and(|mask| mask.has(place))
     }
 
     /// Mean of a voxel, metres from lattice point 0; `None` if the cell is not occupied.
@@ -132,7 +133,7 @@ impl<'a> Probe<'a> {
     }
 
     /// Tests a ray that traverses an open voxel, which it closes if it is passed through or will never be.
-    pub(super) fn meet(&mut self, masks: &ScanMasks, cell: Packed, cursor: &Cursor, line: &Line) {
+    pub(super) fn meet(&mut self, masks: &ScanMasks, cell: Packed, slot: usize, line: &Line) {
         let is_full = self.surfaces.is_full();
         let Surfaces {
             touching,
@@ -163,7 +164,7 @@ impl<'a> Probe<'a> {
         if is_passed {
             passed.push(cell);
         }
-        if let Some(mask) = open.get_mut(cursor.slot) {
+        if let Some(mask) = open.get_mut(slot) {
             mask.remove(cell.place());
         }
     }
