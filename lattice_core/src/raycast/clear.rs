@@ -2,10 +2,9 @@
 
 use rustc_hash::FxHashMap;
 
-use super::masks::{Mask, ScanMasks};
+use super::marks::{MarkBytes, Marks};
 use super::packed::Packed;
-use super::scan::{self, RayBundle, Reach, ScanReport};
-use super::surface::{Probe, Surfaces};
+use super::scan::{RayBundle, Reach, ScanReport};
 use super::traversal::Traversal;
 use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::VoxelStore;
@@ -47,17 +46,6 @@ pub struct ClearReport {
     pub removed: Vec<MortonKey>,
 }
 
-/// Voxels of a store that a marked scan traversed and did not hit.
-pub(super) fn traversed_voxels(masks: &ScanMasks, store: &dyn VoxelStore) -> Vec<Packed> {
-    let mut traversed = Vec::new();
-    for (block, passed, hit) in masks.blocks() {
-        let missed = passed.without(hit);
-        let voxels = Mask::of_voxels(store, block).and(&missed);
-        traversed.extend(voxels.places().map(|place| Packed::at(block, place)));
-    }
-    traversed
-}
-
 /// Clears voxels of a store that rays traverse, for dynamic scenes.
 ///
 /// A voxel is traversed if a ray to the lattice point of a hit cell crosses it more than [`Reach::keep_m`] before the
@@ -68,8 +56,7 @@ pub(super) fn traversed_voxels(masks: &ScanMasks, store: &dyn VoxelStore) -> Vec
 pub struct RayClearer {
     traversal: Traversal,
     options: ClearOptions,
-    masks: ScanMasks,
-    surfaces: Surfaces,
+    marks: Marks,
     missed: FxHashMap<MortonKey, u32>,
 }
 
@@ -79,8 +66,13 @@ impl RayClearer {
         RayClearer {
             traversal: Traversal::new(lattice),
             options,
-            masks: ScanMasks::new(options.max_bytes / 2 / ScanMasks::BYTES_PER_BLOCK),
-            surfaces: Surfaces::new(lattice, options.max_bytes / 2),
+            marks: Marks::new(
+                lattice,
+                MarkBytes {
+                    masks: options.max_bytes / 2,
+                    surfaces: options.max_bytes / 2,
+                },
+            ),
             missed: FxHashMap::default(),
         }
     }
@@ -100,14 +92,14 @@ impl RayClearer {
         }
         let reach = self.options.reach;
         let datum_m = store.datum_m();
-        let (masks, traversal) = (&mut self.masks, &self.traversal);
         let spares = self.options.spare_touching;
-        let probe = spares.then(|| Probe::new(&mut self.surfaces, &*store));
-        report.scan = scan::mark(traversal, masks, &datum_m, scan, reach, probe);
-        let mut traversed = traversed_voxels(&self.masks, store);
+        let probed = spares.then_some(&*store);
+        let marks = &mut self.marks;
+        report.scan = marks.mark(&self.traversal, &datum_m, scan, reach, probed);
+        let mut traversed = marks.traversed_voxels(store);
         let occupied = traversed.len();
         if spares {
-            traversed = self.surfaces.passed().to_vec();
+            traversed = marks.passed().to_vec();
         }
         report.kept = (occupied - traversed.len()) as u64;
         self.forget_hits(store);
@@ -138,7 +130,7 @@ impl RayClearer {
         if self.missed.is_empty() {
             return;
         }
-        for (block, _, hit) in self.masks.blocks() {
+        for (block, _, hit) in self.marks.masks().blocks() {
             for key in hit.places().filter_map(|i| Packed::at(block, i).key()) {
                 self.missed.remove(&key);
             }

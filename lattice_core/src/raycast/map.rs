@@ -3,14 +3,14 @@
 use nalgebra::Vector3;
 
 use super::blocks::{Blocks, add_evidence, apply_to_hit};
-use super::clear::{ClearReport, traversed_voxels};
+use super::clear::ClearReport;
 use super::coarse::Coarse;
 use super::evidence::{Evidence, Steps, UNKNOWN};
 use super::free_space_options::{FreeSpaceError, FreeSpaceOptions};
-use super::masks::{Mask, ScanMasks};
+use super::marks::{MarkBytes, Marks};
+use super::masks::Mask;
 use super::packed::Packed;
-use super::scan::{self, RayBundle, Reach, ScanReport};
-use super::surface::{Probe, Surfaces};
+use super::scan::{RayBundle, Reach, ScanReport};
 use super::traversal::Traversal;
 use crate::lattice::{Lattice, MortonKey};
 use crate::voxels::{DatumError, VoxelStore};
@@ -55,8 +55,7 @@ pub struct FreeSpaceMap {
     datum_m: Vector3<f64>,
     options: FreeSpaceOptions,
     steps: Steps,
-    masks: ScanMasks,
-    surfaces: Surfaces,
+    marks: Marks,
     cells: Blocks,
     free: Free,
 }
@@ -96,14 +95,17 @@ impl FreeSpaceMap {
             Some(0) => Free::Fine,
             Some(level) => Free::Coarse(Box::new(Coarse::new(&lattice, level, share)?)),
         };
+        let bytes = MarkBytes {
+            masks: share / 4,
+            surfaces: share / 8,
+        };
         Ok(FreeSpaceMap {
             datum_m: lattice.center_wide(datum_index),
             datum_index,
             traversal: Traversal::new(&lattice),
             options,
             steps,
-            masks: ScanMasks::new(share / 4 / ScanMasks::BYTES_PER_BLOCK),
-            surfaces: Surfaces::new(&lattice, share / 8),
+            marks: Marks::new(&lattice, bytes),
             cells: Blocks::new(share / 8 * 5 / Blocks::BYTES_PER_BLOCK),
             free,
         })
@@ -119,30 +121,17 @@ impl FreeSpaceMap {
 
     /// Adds a scan. Voxels of `store` that it grazes get no miss; they are counted in `kept`.
     fn add(&mut self, scan: &[RayBundle], store: Option<&dyn VoxelStore>) -> ClearReport {
-        let mut report = scan::mark(
-            &self.traversal,
-            &mut self.masks,
-            &self.datum_m,
-            scan,
-            self.options.reach,
-            store.map(|store| Probe::new(&mut self.surfaces, store)),
-        );
+        let (marks, reach) = (&mut self.marks, self.options.reach);
+        let mut report = marks.mark(&self.traversal, &self.datum_m, scan, reach, store);
         let mut kept = 0;
         if let Some(store) = store {
-            let traversed = traversed_voxels(&self.masks, store);
-            kept = traversed.len();
-            traversed.iter().for_each(|cell| self.masks.spare(*cell));
-            let passed = self.surfaces.passed();
-            kept -= passed.len();
-            for cell in passed {
-                self.masks.pass(*cell);
-            }
+            kept = marks.spare_voxels(store);
         }
         let missed = |(_, passed, hit): (u64, &Mask, &Mask)| -> u64 {
             let words = passed.without(hit).0;
             words.iter().map(|word| u64::from(word.count_ones())).sum()
         };
-        report.misses = self.masks.blocks().map(missed).sum();
+        report.misses = marks.masks().blocks().map(missed).sum();
         report.blocks_refused = self.apply_marks();
         ClearReport {
             scan: report,
@@ -153,15 +142,15 @@ impl FreeSpaceMap {
 
     /// Adds the masks of a scan; returns the number of refused blocks.
     fn apply_marks(&mut self) -> u64 {
-        let steps = &self.steps;
+        let (steps, masks) = (&self.steps, self.marks.masks());
         match &mut self.free {
-            Free::Hit => apply_to_hit(steps, &self.masks, &mut self.cells),
+            Free::Hit => apply_to_hit(steps, masks, &mut self.cells),
             Free::Fine => self.cells.apply(
-                self.masks.blocks(),
+                masks.blocks(),
                 |_, _| true,
                 |cells, passed, hit| add_evidence(steps, cells, passed, hit),
             ),
-            Free::Coarse(coarse) => coarse.apply(steps, &self.masks, &mut self.cells),
+            Free::Coarse(coarse) => coarse.apply(steps, masks, &mut self.cells),
         }
     }
 
@@ -177,7 +166,7 @@ impl FreeSpaceMap {
         let grazed = self.options.spare_touching.then_some(&*store);
         let mut report = self.add(scan, grazed);
         let is_free = |value: i8| value != UNKNOWN && value < self.steps.threshold;
-        for (block, passed, hit) in self.masks.blocks() {
+        for (block, passed, hit) in self.marks.masks().blocks() {
             let Some(cells) = self.cells.block(block) else {
                 continue;
             };
@@ -196,10 +185,8 @@ impl FreeSpaceMap {
     /// Adds one hit to each cell, such as those of a loaded map.
     pub fn insert_occupied(&mut self, keys: &[MortonKey]) {
         for part in keys.chunks(SEED_CELLS) {
-            self.masks.clear();
-            for cell in part.iter().filter_map(|key| Packed::new(key.unpack())) {
-                self.masks.hit(cell);
-            }
+            self.marks
+                .set_hits(part.iter().filter_map(|key| Packed::new(key.unpack())));
             self.apply_marks();
         }
     }
@@ -295,6 +282,6 @@ impl FreeSpaceMap {
             Free::Hit | Free::Fine => 0,
             Free::Coarse(coarse) => coarse.bytes(),
         };
-        self.cells.bytes() + self.masks.bytes() + self.surfaces.bytes() + coarse
+        self.cells.bytes() + self.marks.bytes() + coarse
     }
 }

@@ -178,10 +178,26 @@ impl ScanMasks {
         mask.is_some_and(|mask| mask.has(cell.place()))
     }
 
-    /// Blocks from a slot on, each with its hit cells; slot 0 has none.
-    pub(super) fn blocks_from(&self, slot: usize) -> impl Iterator<Item = (u64, &Mask)> {
-        let blocks = self.blocks.iter().zip(&self.hit).skip(slot);
-        blocks.map(|(block, hit)| (*block, hit))
+    /// Hit cells of a block.
+    pub(super) fn hits_of(&self, block: u64) -> Mask {
+        let slot = self.find(Packed(block)).ok();
+        let hits = slot.and_then(|slot| self.hit.get(slot));
+        hits.copied().unwrap_or_default()
+    }
+
+    /// Blocks from a slot on; that of slot 0 is none.
+    pub(super) fn blocks_from(&self, slot: usize) -> &[u64] {
+        self.blocks.get(slot..).unwrap_or_default()
+    }
+
+    /// Marks the traversed cells of other masks as well.
+    pub(super) fn unite(&mut self, other: &ScanMasks) {
+        for (block, passed, _) in other.blocks() {
+            let slot = self.slot_of(Packed(block));
+            if let Some(mask) = self.passed.get_mut(slot) {
+                *mask = mask.or(passed);
+            }
+        }
     }
 
     fn tag(&self, block: u64) -> u64 {

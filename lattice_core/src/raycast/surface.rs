@@ -45,6 +45,7 @@ pub(super) struct Surfaces {
     /// Surfaces about those that a ray has met.
     surfaces: FxHashMap<Packed, Surface>,
     passed: Vec<Packed>,
+    was_full: bool,
 }
 
 impl Surfaces {
@@ -61,6 +62,7 @@ impl Surfaces {
             open: Vec::new(),
             surfaces: FxHashMap::default(),
             passed: Vec::new(),
+            was_full: false,
         }
     }
 
@@ -70,9 +72,28 @@ impl Surfaces {
             + self.passed.capacity() * size_of::<Packed>()
     }
 
-    /// Voxels that the last scan passed through, in no order.
+    /// Voxels that the last scan passed through, each once, in no order.
     pub(super) fn passed(&self) -> &[Packed] {
         &self.passed
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.open.clear();
+        self.surfaces.clear();
+        self.passed.clear();
+        self.was_full = false;
+    }
+
+    /// Adds the voxels that other rays passed through.
+    pub(super) fn unite(&mut self, other: &Surfaces) {
+        self.passed.extend(&other.passed);
+        self.passed.sort_unstable();
+        self.passed.dedup();
+    }
+
+    /// True if a voxel of the last scan was kept for lack of memory.
+    pub(super) fn was_full(&self) -> bool {
+        self.was_full
     }
 
     fn is_full(&self) -> bool {
@@ -98,33 +119,24 @@ impl<'a> Probe<'a> {
         }
     }
 
-    pub(super) fn clear(&mut self) {
-        self.surfaces.open.clear();
-        self.surfaces.surfaces.clear();
-        self.surfaces.passed.clear();
-    }
-
-    /// True for a voxel, by slot and place, that is not hit and may yet be passed through. All hits of the scan are marked.
+    /// True for a voxel, by slot and place, that is not hit and may yet be passed through; `None` before
+    /// [`Probe::read`].
     #[inline(always)]
-    pub(super) fn is_open(&mut self, masks: &ScanMasks, slot: usize, place: usize) -> bool {
-        match self.surfaces.open.get(slot) {
-            Some(mask) => mask.has(place),
-            None => self.read(masks, slot, place),
-        }
+    pub(super) fn is_open(&self, slot: usize, place: usize) -> Option<bool> {
+        let open = self.surfaces.open.get(slot)?;
+        Some(open.has(place))
     }
 
-    /// Reads the voxels of new blocks from the store.
-    #[inline(never)]
-    fn read(&mut self, masks: &ScanMasks, slot: usize, place: usize) -> bool {
+    /// Reads the voxels of new blocks of `masks` from the store, less those that are hit.
+    pub(super) fn read(&mut self, masks: &ScanMasks, hits: &ScanMasks) {
         let open = &mut self.surfaces.open;
-        for (slot, (block, hit)) in (open.len()..).zip(masks.blocks_from(open.len())) {
+        for (slot, block) in (open.len()..).zip(masks.blocks_from(open.len())) {
             open.push(match slot {
                 // The cells of refused blocks.
                 0 => Mask::default(),
-                _ => Mask::of_voxels(self.store, block).without(hit),
+                _ => Mask::of_voxels(self.store, *block).without(&hits.hits_of(*block)),
             });
         }
-        open.get(slot).is_some_and(|mask| mask.has(place))
     }
 
     /// Mean of a voxel, metres from lattice point 0; `None` if the cell is not occupied.
@@ -133,9 +145,10 @@ impl<'a> Probe<'a> {
     }
 
     /// Tests a ray that traverses an open voxel, which it closes if it is passed through or will never be.
-    pub(super) fn meet(&mut self, masks: &ScanMasks, cell: Packed, slot: usize, line: &Line) {
+    pub(super) fn meet(&mut self, hits: &ScanMasks, cell: Packed, slot: usize, line: &Line) {
         let is_full = self.surfaces.is_full();
         let Surfaces {
+            was_full,
             touching,
             open,
             surfaces,
@@ -150,7 +163,8 @@ impl<'a> Probe<'a> {
             Entry::Occupied(_) => return,
             Entry::Vacant(place) => {
                 let mut around = touching.iter().map(|n| cell.plus(difference(*n)));
-                let is_grazed = is_full || around.any(|cell| masks.is_hit(cell));
+                *was_full |= is_full;
+                let is_grazed = is_full || around.any(|cell| hits.is_hit(cell));
                 let about = || Surface::about(self.store, touching, cell.unpack());
                 match (!is_grazed).then(about).flatten() {
                     Some(surface) if !surface.is_passed_by(line) => {
