@@ -18,6 +18,9 @@ pub(super) struct Surface {
     pub(super) is_standable: bool,
 }
 
+/// Samples of a surface, as offsets from the centre of their column in x and y and as heights.
+pub(super) type Layer = Vec<Vector3<f64>>;
+
 /// Surfaces and matter of a column with samples.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ColumnState {
@@ -45,7 +48,7 @@ fn spans<'a>(
 }
 
 /// Samples of a span within a step of its top that no other sample covers: the underside of a deck is none of them.
-fn layer(columns: &Columns, span: &[Vector3<f64>], ground: &GroundOptions) -> Vec<Vector3<f64>> {
+fn layer(columns: &Columns, span: &[Vector3<f64>], ground: &GroundOptions) -> Layer {
     let top_m = span.last().map_or(0.0, |sample| sample.z);
     let low_m = top_m - layer_m(columns, ground);
     let begin = span.partition_point(|sample| sample.z < low_m);
@@ -81,25 +84,26 @@ fn surrounds(layer: &[Vector3<f64>]) -> bool {
 }
 
 /// Layers of samples that are surfaces, in the order of [`ColumnState::surfaces`].
-pub(super) fn layers(
-    columns: &Columns,
-    window: &[Vector3<f64>],
-    ground: &GroundOptions,
-) -> impl Iterator<Item = Vec<Vector3<f64>>> {
+fn layers(columns: &Columns, window: &[Vector3<f64>], ground: &GroundOptions) -> Vec<Layer> {
     let layers = spans(columns, window, ground).map(|span| layer(columns, span, ground));
-    layers.filter(|layer| surrounds(layer))
+    layers.filter(|layer| surrounds(layer)).collect()
 }
 
-/// State of a column; `None` without samples.
+/// Layers of the surfaces of a column.
+pub(super) fn layers_of(columns: &Columns, column: Column, ground: &GroundOptions) -> Vec<Layer> {
+    layers(columns, &columns.window(column), ground)
+}
+
+/// State of a column and the layers of its surfaces; `None` without samples.
 pub(super) fn of_column(
     columns: &Columns,
     column: Column,
     ground: &GroundOptions,
-) -> Option<ColumnState> {
+) -> Option<(ColumnState, Vec<Layer>)> {
     let window = columns.window(column);
     let tall_m = layer_m(columns, ground);
-    let surface = |layer: Vec<Vector3<f64>>| Surface {
-        at_m: mean(columns, column, &layer),
+    let surface = |layer: &Layer| Surface {
+        at_m: mean(columns, column, layer),
         slope: 0.0,
         step_m: 0.0,
         is_standable: false,
@@ -108,9 +112,13 @@ pub(super) fn of_column(
         [low, .., high] if high.z - low.z > tall_m => Some([low.z, high.z]),
         _ => None,
     };
-    (!window.is_empty()).then(|| ColumnState {
-        surfaces: layers(columns, &window, ground).map(surface).collect(),
-        tall_m: spans(columns, &window, ground).filter_map(tall).collect(),
+    (!window.is_empty()).then(|| {
+        let layers = layers(columns, &window, ground);
+        let state = ColumnState {
+            surfaces: layers.iter().map(surface).collect(),
+            tall_m: spans(columns, &window, ground).filter_map(tall).collect(),
+        };
+        (state, layers)
     })
 }
 

@@ -7,6 +7,8 @@ use crate::lattice::LatticeKind;
 mod brute_paths;
 mod changes;
 mod paths;
+mod tiles;
+mod work;
 mod world;
 
 const SEEDS: u64 = 4;
