@@ -3,12 +3,11 @@
 use nalgebra::Vector3;
 
 use super::GroundOptions;
-use super::columns::Column;
 use super::grid::{Cell, Grid};
 use super::reach::Reached;
 use super::surface_graph::{CORNERS, EDGES, beside, linked};
 use super::surfaces::ColumnState;
-use super::tiles::Tiles;
+use super::tiles::{Column, Tiles};
 
 /// Paints the grid.
 pub(super) fn paint(

@@ -2,11 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::tiles::Tiles;
+use super::tiles::{Column, Tiles};
 use crate::lattice::{Lattice, MortonKey};
-
-/// Column of the grid: floor of x and y over the resolution.
-pub(super) type Column = [i32; 2];
 
 /// Maximum of a column's numbers.
 const MAX_COLUMN: f64 = (1_u32 << 30) as f64;
@@ -117,6 +114,11 @@ impl Columns {
         });
         found.sort_unstable_by(|(a, p), (b, q)| p.z.total_cmp(&q.z).then(a.cmp(b)));
         found.into_iter().map(|(_, at_m)| at_m).collect()
+    }
+
+    /// Columns with samples, unordered.
+    pub(super) fn occupied(&self) -> impl Iterator<Item = Column> {
+        self.bins.iter().map(|(column, _)| column)
     }
 
     /// All samples, unordered.

@@ -20,6 +20,8 @@
 
 mod cells;
 mod columns;
+mod elevation;
+mod elevation_limit;
 mod flat;
 mod grid;
 mod grid_limit;
@@ -49,6 +51,8 @@ use self::surfaces::ColumnState;
 use self::tiles::{ColumnSet, Tiles};
 use crate::lattice::{Lattice, MortonKey};
 
+pub use elevation::{Elevation, Square};
+pub use elevation_limit::MAX_ELEVATION_CELLS;
 pub use flat::FreeCells;
 pub use grid::{Cell, Grid, MAX_GRID_CELLS};
 pub use ground_map::{GroundMap, GroundPath, GroundPathOptions};
@@ -146,6 +150,21 @@ impl Projector {
         Ok(cells::paint(&self.states, &reached, &ground))
     }
 
+    /// Grid of the map as it is, and the ground of a square, or of the whole grid; errors with [`ProjectionRule::Flat`].
+    pub fn grid_and_elevation(
+        &mut self,
+        robot_m: Option<Vector3<f64>>,
+        square: Option<Square>,
+    ) -> Result<(Grid, Result<Elevation, ProjectionError>), ProjectionError> {
+        let ProjectionRule::Ground(ground) = self.options.rule else {
+            return Err(ProjectionError::FlatRule);
+        };
+        let reached = Reached::new(&*self.graph(&ground)?, &ground, robot_m);
+        let grid = cells::paint(&self.states, &reached, &ground);
+        let elevation = elevation::of(&self.states, &reached, &grid, &ground, square);
+        Ok((grid, elevation))
+    }
+
     /// Ground of the map as it is, to search paths on; an error with [`ProjectionRule::Flat`].
     pub fn ground_map(&mut self) -> Result<GroundMap, GroundPathError> {
         let ProjectionRule::Ground(ground) = self.options.rule else {
@@ -161,9 +180,11 @@ impl Projector {
 
     /// Linked surfaces of the map as it is.
     fn graph(&mut self, ground: &GroundOptions) -> Result<Arc<SurfaceGraph>, ProjectionError> {
-        let changed = std::mem::take(&mut self.changed);
-        if !changed.is_empty() {
+        if !self.changed.is_empty() {
             self.graph = None;
+            // Before surfaces are found on a map that is too wide for a grid.
+            Grid::bounds(self.columns.occupied())?;
+            let changed = std::mem::take(&mut self.changed);
             self.gathered += refresh::refresh(&self.columns, &mut self.states, &changed, ground);
         }
         if let Some(graph) = &self.graph {

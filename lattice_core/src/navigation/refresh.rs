@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::columns::{Column, Columns};
+use super::columns::Columns;
 use super::options::GroundOptions;
 use super::surfaces::{self, ColumnState, Layer};
 use super::terrain;
-use super::tiles::{ColumnSet, Tiles};
+use super::tiles::{Column, ColumnSet, Tiles};
 
 /// Columns after which surfaces are judged: bounds the layers that are kept until then. Small maps of tests have many
 /// batches too.

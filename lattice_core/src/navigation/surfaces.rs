@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 
 use super::GroundOptions;
-use super::columns::{Column, Columns};
+use super::columns::Columns;
+use super::tiles::Column;
 
 /// Top of a span of matter in a column, with room for the robot above it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,6 +15,8 @@ pub(super) struct Surface {
     pub(super) slope: f64,
     /// Height of the step at the column, metres.
     pub(super) step_m: f64,
+    /// Distance to the lowest sample above, metres; infinite without any.
+    pub(super) clearance_m: f64,
     /// True if slope and step are within the limits of the robot.
     pub(super) is_standable: bool,
 }
@@ -102,10 +105,11 @@ pub(super) fn of_column(
 ) -> Option<(ColumnState, Vec<Layer>)> {
     let window = columns.window(column);
     let tall_m = layer_m(columns, ground);
-    let surface = |layer: &Layer| Surface {
-        at_m: mean(columns, column, layer),
+    let surface = |layer: &Layer, at_m: Vector3<f64>| Surface {
+        at_m,
         slope: 0.0,
         step_m: 0.0,
+        clearance_m: clearance_m(&window, layer, at_m.z),
         is_standable: false,
     };
     let tall = |span: &[Vector3<f64>]| match span {
@@ -115,11 +119,24 @@ pub(super) fn of_column(
     (!window.is_empty()).then(|| {
         let layers = layers(columns, &window, ground);
         let state = ColumnState {
-            surfaces: layers.iter().map(surface).collect(),
+            surfaces: layers
+                .iter()
+                .map(|layer| surface(layer, mean(columns, column, layer)))
+                .collect(),
             tall_m: spans(columns, &window, ground).filter_map(tall).collect(),
         };
         (state, layers)
     })
+}
+
+/// Distance from a surface to the lowest sample of a window above its layer, metres; infinite without any.
+fn clearance_m(window: &[Vector3<f64>], layer: &[Vector3<f64>], z_m: f64) -> f64 {
+    // The top of a span is the last one of its layer, as nothing covers it.
+    let top_m = layer.last().map_or(z_m, |sample| sample.z);
+    let above = window.partition_point(|sample| sample.z <= top_m);
+    window
+        .get(above)
+        .map_or(f64::INFINITY, |sample| sample.z - z_m)
 }
 
 /// Mean of samples, weighted by their distance from the border of the window.

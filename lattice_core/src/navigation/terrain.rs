@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 use super::GroundOptions;
-use super::columns::{Column, Columns};
+use super::columns::Columns;
 use super::surfaces::{ColumnState, Layer, Surface};
-use super::tiles::Tiles;
+use super::tiles::{Column, Tiles};
 
 /// Strides on each side from which the inclination beyond a step is taken.
 pub(super) const REACH: i32 = 4;

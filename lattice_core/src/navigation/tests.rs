@@ -6,6 +6,7 @@ use crate::lattice::LatticeKind;
 
 mod brute_paths;
 mod changes;
+mod elevation;
 mod paths;
 mod tiles;
 mod work;

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use rustc_hash::FxHashMap;
 
-use super::columns::Column;
+/// Column of the grid: floor of x and y over the resolution.
+pub(super) type Column = [i32; 2];
 
 /// Binary logarithm of a tile's edge in columns.
 const SHIFT: u32 = 3;

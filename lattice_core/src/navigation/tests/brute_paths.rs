@@ -34,6 +34,7 @@ fn terrain(random: &mut Random, side: i32) -> SurfaceGraph {
             ),
             slope: 0.0,
             step_m: 0.0,
+            clearance_m: f64::INFINITY,
             is_standable: true,
         };
         let surfaces = heights_m.iter().map(surface).collect();

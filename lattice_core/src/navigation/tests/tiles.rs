@@ -4,8 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use proptest::prelude::*;
 
-use super::super::columns::Column;
-use super::super::tiles::{ColumnSet, Tiles};
+use super::super::tiles::{Column, ColumnSet, Tiles};
 
 fn column() -> impl Strategy<Value = Column> {
     // Across the corner of four tiles, and on both sides of 0.
