@@ -25,6 +25,8 @@ packages! {
     geographic_msgs,
     /// Positions, rotations, poses, velocities and transforms.
     geometry_msgs,
+    /// Maps of layers for legged robots (ROS 2 branches).
+    grid_map_msgs,
     /// Messages of Lattice (package `lattice_msgs`): maps, and the calibration of a headset.
     lattice,
     /// States of managed nodes and their transitions.

@@ -56,6 +56,32 @@ OccupancyGridUpdate = ros(
     height=uint32,
     data=sequence[int8],
 )
+MultiArrayDimension = ros(
+    "std_msgs/msg/MultiArrayDimension", label=str, size=uint32, stride=uint32
+)
+MultiArrayLayout = ros(
+    "std_msgs/msg/MultiArrayLayout", dim=sequence[MultiArrayDimension], data_offset=uint32
+)
+Float32MultiArray = ros(
+    "std_msgs/msg/Float32MultiArray", layout=MultiArrayLayout, data=sequence[float32]
+)
+GridMapInfo = ros(
+    "grid_map_msgs/msg/GridMapInfo",
+    resolution=float64,
+    length_x=float64,
+    length_y=float64,
+    pose=Pose,
+)
+GridMap = ros(
+    "grid_map_msgs/msg/GridMap",
+    header=Header,
+    info=GridMapInfo,
+    layers=sequence[str],
+    basic_layers=sequence[str],
+    data=sequence[Float32MultiArray],
+    outer_start_index=uint16,
+    inner_start_index=uint16,
+)
 Octomap = ros(
     "octomap_msgs/msg/Octomap",
     header=Header,

@@ -1,28 +1,27 @@
 //! Cells of the grid from reached surfaces and matter.
 
 use nalgebra::Vector3;
-use rustc_hash::FxHashMap;
 
 use super::GroundOptions;
-use super::columns::Column;
 use super::grid::{Cell, Grid};
 use super::reach::Reached;
 use super::surface_graph::{CORNERS, EDGES, beside, linked};
 use super::surfaces::ColumnState;
+use super::tiles::{Column, Tiles};
 
 /// Paints the grid.
 pub(super) fn paint(
-    states: &FxHashMap<Column, ColumnState>,
+    states: &Tiles<ColumnState>,
     reached: &Reached,
     ground: &GroundOptions,
 ) -> Grid {
     let mut grid = reached.grid.clone();
-    for (column, state) in states {
-        let Some(i) = grid.index(*column) else {
+    for (column, state) in states.iter() {
+        let Some(i) = grid.index(column) else {
             continue;
         };
         let cell = match reached.drawn.get(i) {
-            Some(Some(_)) if is_edge(states, reached, *column, i, ground) => Cell::Occupied,
+            Some(Some(_)) if is_edge(states, reached, column, i, ground) => Cell::Occupied,
             Some(Some(_)) => Cell::Free,
             _ => of_matter(state, reached, i, ground),
         };
@@ -55,7 +54,7 @@ fn of_matter(state: &ColumnState, reached: &Reached, i: usize, ground: &GroundOp
 
 /// Tests whether the surface of a cell ends beside a lower one, or at a wall that goes down.
 fn is_edge(
-    states: &FxHashMap<Column, ColumnState>,
+    states: &Tiles<ColumnState>,
     reached: &Reached,
     column: Column,
     i: usize,
@@ -73,7 +72,7 @@ fn is_edge(
         match beside(&reached.grid, i, [dx, dy]).and_then(drawn) {
             Some(other_m) => is_lower(&other_m),
             None => states
-                .get(&[column[0] + dx, column[1] + dy])
+                .get([column[0] + dx, column[1] + dy])
                 .is_some_and(|state| {
                     state.surfaces.iter().any(|low| is_lower(&low.at_m))
                         || state.tall_m.iter().any(goes_down)
@@ -86,7 +85,7 @@ fn is_edge(
 /// between them is too steep.
 fn paint_drops(
     grid: &mut Grid,
-    states: &FxHashMap<Column, ColumnState>,
+    states: &Tiles<ColumnState>,
     reached: &Reached,
     ground: &GroundOptions,
 ) {
@@ -132,10 +131,10 @@ fn paint_drops(
 }
 
 /// Lowest surface of each cell, metres; NaN where there is none.
-fn lowest(grid: &Grid, states: &FxHashMap<Column, ColumnState>) -> Vec<f64> {
+fn lowest(grid: &Grid, states: &Tiles<ColumnState>) -> Vec<f64> {
     let mut lowest_m = vec![f64::NAN; grid.cells.len()];
-    for (column, state) in states {
-        let cell = grid.index(*column).and_then(|i| lowest_m.get_mut(i));
+    for (column, state) in states.iter() {
+        let cell = grid.index(column).and_then(|i| lowest_m.get_mut(i));
         if let (Some(cell), Some(surface)) = (cell, state.surfaces.first()) {
             *cell = surface.at_m.z;
         }

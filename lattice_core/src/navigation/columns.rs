@@ -1,12 +1,9 @@
 //! Samples of the voxels, in columns of the grid.
 
 use nalgebra::Vector3;
-use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::tiles::{Column, Tiles};
 use crate::lattice::{Lattice, MortonKey};
-
-/// Column of the grid: floor of x and y over the resolution.
-pub(super) type Column = [i32; 2];
 
 /// Maximum of a column's numbers.
 const MAX_COLUMN: f64 = (1_u32 << 30) as f64;
@@ -41,7 +38,7 @@ pub(super) struct Columns {
     /// Half the width of the window of a column, metres.
     pub(super) window_m: f64,
     /// Samples by the column of their cell's centre, in ascending order of keys.
-    bins: FxHashMap<Column, Vec<Sample>>,
+    bins: Tiles<Vec<Sample>>,
 }
 
 impl Columns {
@@ -51,7 +48,7 @@ impl Columns {
             datum_m,
             resolution_m,
             window_m: 0.5 * resolution_m + WINDOW_SIDES * lattice.cell_side_m(),
-            bins: FxHashMap::default(),
+            bins: Tiles::default(),
         }
     }
 
@@ -88,79 +85,67 @@ impl Columns {
         let center_m = self.datum_m + self.lattice.center(key.unpack());
         let column = self.column_of(center_m.x, center_m.y)?;
         let step_m = self.side_m() / MEAN_STEPS;
-        let bin = self.bins.entry(column).or_default();
-        let found = bin.binary_search_by_key(&key, |sample| sample.key);
         let sample = offset_m.map(|offset_m| Sample {
             key,
             at_m: center_m + offset_m.map(|offset_m| (offset_m / step_m).round() * step_m),
         });
         let sample = sample.filter(|sample| sample.at_m.iter().all(|value| value.is_finite()));
-        let changed = match (found, sample) {
-            (Ok(i), Some(sample)) => match bin.get_mut(i) {
-                Some(old) if *old != sample => {
-                    *old = sample;
-                    true
-                }
-                _ => false,
-            },
-            (Ok(i), None) => {
-                bin.remove(i);
-                true
+        let changed = self.bins.update(column, |bin| {
+            let samples = bin.get_or_insert_default();
+            let changed = set_sample(samples, key, sample);
+            if samples.is_empty() {
+                *bin = None;
             }
-            (Err(i), Some(sample)) => {
-                bin.insert(i, sample);
-                true
-            }
-            (Err(_), None) => false,
-        };
-        if bin.is_empty() {
-            self.bins.remove(&column);
-        }
-        changed.then_some(column)
+            changed
+        });
+        changed.filter(|changed| *changed).map(|_| column)
     }
 
     /// Samples in the window of a column, lowest first, as offsets from its centre in x and y and as heights.
     pub(super) fn window(&self, column: Column) -> Vec<Vector3<f64>> {
         let [x_m, y_m] = self.center_m(column);
-        let reach = self.reach();
         let mut found: Vec<(MortonKey, Vector3<f64>)> = Vec::new();
-        for bin in square(column, reach).filter_map(|column| self.bins.get(&column)) {
+        self.bins.for_square(column, self.reach(), |bin| {
             found.extend(bin.iter().filter_map(|sample| {
                 let at_m = sample.at_m - Vector3::new(x_m, y_m, 0.0);
                 let inside = at_m.x.abs() <= self.window_m && at_m.y.abs() <= self.window_m;
                 inside.then_some((sample.key, at_m))
             }));
-        }
+        });
         found.sort_unstable_by(|(a, p), (b, q)| p.z.total_cmp(&q.z).then(a.cmp(b)));
         found.into_iter().map(|(_, at_m)| at_m).collect()
     }
 
+    /// Columns with samples, unordered.
+    pub(super) fn occupied(&self) -> impl Iterator<Item = Column> {
+        self.bins.iter().map(|(column, _)| column)
+    }
+
     /// All samples, unordered.
     pub(super) fn samples(&self) -> impl Iterator<Item = &Sample> {
-        self.bins.values().flatten()
+        self.bins.iter().flat_map(|(_, bin)| bin)
     }
 }
 
-/// Columns of a square around a column.
-fn square(column: Column, reach: i32) -> impl Iterator<Item = Column> {
-    let rows = (-reach..=reach).filter_map(move |dy| column[1].checked_add(dy));
-    rows.flat_map(move |y| {
-        let columns = (-reach..=reach).filter_map(move |dx| column[0].checked_add(dx));
-        columns.map(move |x| [x, y])
-    })
-}
-
-/// Columns within a reach of any of these, each once.
-pub(super) fn around(columns: &FxHashSet<Column>, reach: i32) -> Vec<Column> {
-    let wide = columns.iter().flat_map(|[x, y]| {
-        let columns = (-reach..=reach).filter_map(move |dx| x.checked_add(dx));
-        columns.map(move |x| [x, *y])
-    });
-    let wide: FxHashSet<Column> = wide.collect();
-    let high = wide.iter().flat_map(|[x, y]| {
-        let rows = (-reach..=reach).filter_map(move |dy| y.checked_add(dy));
-        rows.map(move |y| [*x, y])
-    });
-    let all: FxHashSet<Column> = high.collect();
-    all.into_iter().collect()
+/// Sets or removes the sample of a voxel among those of a bin; returns whether they changed.
+fn set_sample(bin: &mut Vec<Sample>, key: MortonKey, sample: Option<Sample>) -> bool {
+    let found = bin.binary_search_by_key(&key, |sample| sample.key);
+    match (found, sample) {
+        (Ok(i), Some(sample)) => match bin.get_mut(i) {
+            Some(old) if *old != sample => {
+                *old = sample;
+                true
+            }
+            _ => false,
+        },
+        (Ok(i), None) => {
+            bin.remove(i);
+            true
+        }
+        (Err(i), Some(sample)) => {
+            bin.insert(i, sample);
+            true
+        }
+        (Err(_), None) => false,
+    }
 }

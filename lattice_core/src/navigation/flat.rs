@@ -3,8 +3,9 @@
 use nalgebra::Vector3;
 
 use super::ProjectionError;
-use super::columns::{Column, Columns};
+use super::columns::Columns;
 use super::grid::{Cell, Grid};
+use super::tiles::Column;
 use crate::lattice::{Lattice, MortonKey};
 
 /// Part of a cell's edge by which it has to reach into a column.

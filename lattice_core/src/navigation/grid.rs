@@ -1,8 +1,8 @@
 //! Occupancy grid.
 
 use super::ProjectionError;
-use super::columns::Column;
 pub use super::grid_limit::MAX_GRID_CELLS;
+use super::tiles::Column;
 
 /// State of a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -37,6 +37,19 @@ impl Grid {
         columns: impl Iterator<Item = Column>,
         resolution_m: f64,
     ) -> Result<Grid, ProjectionError> {
+        match Grid::bounds(columns)? {
+            Some((low, [width, height])) => Grid::unknown(low, width, height, resolution_m),
+            None => Ok(Grid {
+                resolution_m,
+                ..Grid::default()
+            }),
+        }
+    }
+
+    /// Lowest column and size of the smallest rectangle with these columns; an error if it is too large for a grid.
+    pub(super) fn bounds(
+        columns: impl Iterator<Item = Column>,
+    ) -> Result<Option<(Column, [u64; 2])>, ProjectionError> {
         let none = ([i32::MAX; 2], [i32::MIN; 2]);
         let (low, high) = columns.fold(none, |(low, high), column| {
             let bound =
@@ -44,13 +57,14 @@ impl Grid {
             (bound(i32::min, low), bound(i32::max, high))
         });
         if low[0] > high[0] {
-            return Ok(Grid {
-                resolution_m,
-                ..Grid::default()
-            });
+            return Ok(None);
         }
         let length = |axis: usize| (i64::from(high[axis]) - i64::from(low[axis]) + 1) as u64;
-        Grid::unknown(low, length(0), length(1), resolution_m)
+        let (width, height) = (length(0), length(1));
+        if width.saturating_mul(height) > MAX_GRID_CELLS {
+            return Err(ProjectionError::TooLarge { width, height });
+        }
+        Ok(Some((low, [width, height])))
     }
 
     /// Unknown cells of a rectangle.
@@ -92,6 +106,16 @@ impl Grid {
     /// Position of the lower-left corner of the first cell in the map frame, metres: multiples of the resolution.
     pub fn origin_m(&self) -> [f64; 2] {
         self.corner.map(|i| f64::from(i) * self.resolution_m)
+    }
+
+    /// Column of a cell.
+    pub(super) fn column(&self, i: usize) -> Column {
+        let width = self.width.max(1);
+        let along = |corner: i32, k: usize| corner.saturating_add(k as i32);
+        [
+            along(self.corner[0], i % width),
+            along(self.corner[1], i / width),
+        ]
     }
 
     /// Index of a column's cell, if it is inside.

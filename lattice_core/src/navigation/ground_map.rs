@@ -1,5 +1,7 @@
 //! Paths of a robot on the ground.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::ground_path_error::{GroundPathError, PathEnd};
@@ -50,12 +52,12 @@ pub struct GroundPath {
 /// Ground of a map, on which paths are searched.
 #[derive(Clone, Debug)]
 pub struct GroundMap {
-    graph: SurfaceGraph,
+    graph: Arc<SurfaceGraph>,
     ground: GroundOptions,
 }
 
 impl GroundMap {
-    pub(super) fn new(graph: SurfaceGraph, ground: GroundOptions) -> GroundMap {
+    pub(super) fn new(graph: Arc<SurfaceGraph>, ground: GroundOptions) -> GroundMap {
         GroundMap { graph, ground }
     }
 

@@ -20,6 +20,8 @@
 
 mod cells;
 mod columns;
+mod elevation;
+mod elevation_limit;
 mod flat;
 mod grid;
 mod grid_limit;
@@ -30,24 +32,27 @@ mod options;
 mod path_ends;
 mod path_points;
 mod reach;
+mod refresh;
 mod robot_room;
 mod surface_graph;
 mod surface_steps;
 mod surfaces;
 mod terrain;
+mod tiles;
 
-use std::collections::hash_map::Entry;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
-use rayon::prelude::*;
-use rustc_hash::{FxHashMap, FxHashSet};
 
-use self::columns::{Column, Columns};
+use self::columns::Columns;
 use self::reach::Reached;
 use self::surface_graph::SurfaceGraph;
 use self::surfaces::ColumnState;
+use self::tiles::{ColumnSet, Tiles};
 use crate::lattice::{Lattice, MortonKey};
 
+pub use elevation::{Elevation, Square};
+pub use elevation_limit::MAX_ELEVATION_CELLS;
 pub use flat::FreeCells;
 pub use grid::{Cell, Grid, MAX_GRID_CELLS};
 pub use ground_map::{GroundMap, GroundPath, GroundPathOptions};
@@ -86,9 +91,12 @@ pub use options::{GroundOptions, ProjectionError, ProjectionRule, ProjectorOptio
 pub struct Projector {
     columns: Columns,
     options: ProjectorOptions,
-    states: FxHashMap<Column, ColumnState>,
+    states: Tiles<ColumnState>,
     /// Columns with changed samples since the last grid.
-    changed: FxHashSet<Column>,
+    changed: ColumnSet,
+    /// Surfaces of all floors, linked; `None` if they changed since it was made.
+    graph: Option<Arc<SurfaceGraph>>,
+    gathered: u64,
 }
 
 impl Projector {
@@ -102,8 +110,10 @@ impl Projector {
         Ok(Projector {
             columns: Columns::new(lattice, datum_m, options.resolution_of(lattice)),
             options,
-            states: FxHashMap::default(),
-            changed: FxHashSet::default(),
+            states: Tiles::default(),
+            changed: ColumnSet::default(),
+            graph: None,
+            gathered: 0,
         })
     }
 
@@ -136,9 +146,23 @@ impl Projector {
             }
             ProjectionRule::Ground(ground) => ground,
         };
-        self.refresh(&ground);
-        let reached = Reached::new(&self.states, self.resolution_m(), &ground, robot_m)?;
+        let reached = Reached::new(&*self.graph(&ground)?, &ground, robot_m);
         Ok(cells::paint(&self.states, &reached, &ground))
+    }
+
+    /// Grid of the map as it is, and the ground of a square, or of the whole grid; errors with [`ProjectionRule::Flat`].
+    pub fn grid_and_elevation(
+        &mut self,
+        robot_m: Option<Vector3<f64>>,
+        square: Option<Square>,
+    ) -> Result<(Grid, Result<Elevation, ProjectionError>), ProjectionError> {
+        let ProjectionRule::Ground(ground) = self.options.rule else {
+            return Err(ProjectionError::FlatRule);
+        };
+        let reached = Reached::new(&*self.graph(&ground)?, &ground, robot_m);
+        let grid = cells::paint(&self.states, &reached, &ground);
+        let elevation = elevation::of(&self.states, &reached, &grid, &ground, square);
+        Ok((grid, elevation))
     }
 
     /// Ground of the map as it is, to search paths on; an error with [`ProjectionRule::Flat`].
@@ -146,45 +170,28 @@ impl Projector {
         let ProjectionRule::Ground(ground) = self.options.rule else {
             return Err(GroundPathError::FlatRule);
         };
-        self.refresh(&ground);
-        let graph = SurfaceGraph::new(&self.states, self.resolution_m(), &ground)?;
-        Ok(GroundMap::new(graph, ground))
+        Ok(GroundMap::new(self.graph(&ground)?, ground))
     }
 
-    /// Brings surfaces and their inclinations up to date where samples changed.
-    fn refresh(&mut self, ground: &GroundOptions) {
-        let changed = std::mem::take(&mut self.changed);
-        let seen = columns::around(&changed, self.columns.reach());
-        let states: Vec<_> = (seen.par_iter())
-            .map(|column| (*column, surfaces::of_column(&self.columns, *column, ground)))
-            .collect();
-        for (column, state) in states {
-            match (state, self.states.entry(column)) {
-                (Some(state), Entry::Occupied(mut entry)) => drop(entry.insert(state)),
-                (Some(state), Entry::Vacant(entry)) => drop(entry.insert(state)),
-                (None, Entry::Occupied(entry)) => drop(entry.remove()),
-                (None, Entry::Vacant(_)) => {}
-            }
+    /// Number of times that the samples of a column were gathered since the start, of which the work is a multiple.
+    pub fn columns_gathered(&self) -> u64 {
+        self.gathered
+    }
+
+    /// Linked surfaces of the map as it is.
+    fn graph(&mut self, ground: &GroundOptions) -> Result<Arc<SurfaceGraph>, ProjectionError> {
+        if !self.changed.is_empty() {
+            self.graph = None;
+            // Before surfaces are found on a map that is too wide for a grid.
+            Grid::bounds(self.columns.occupied())?;
+            let changed = std::mem::take(&mut self.changed);
+            self.gathered += refresh::refresh(&self.columns, &mut self.states, &changed, ground);
         }
-        let stride = self.columns.stride();
-        let judged = columns::around(&changed, self.columns.reach() + terrain::REACH * stride);
-        let judged: Vec<_> = (judged.par_iter())
-            .filter(|column| self.states.contains_key(*column))
-            .map(|column| {
-                let standable = terrain::standable(&self.columns, &self.states, *column, ground);
-                (*column, standable)
-            })
-            .collect();
-        for (column, standable) in judged {
-            let surfaces = self
-                .states
-                .get_mut(&column)
-                .map(|state| &mut state.surfaces);
-            for (surface, terrain) in surfaces.into_iter().flatten().zip(standable) {
-                (surface.slope, surface.step_m) = (terrain.slope, terrain.step_m);
-                surface.is_standable = terrain.is_standable;
-            }
+        if let Some(graph) = &self.graph {
+            return Ok(Arc::clone(graph));
         }
+        let graph = SurfaceGraph::new(&self.states, self.resolution_m(), ground)?;
+        Ok(Arc::clone(self.graph.insert(Arc::new(graph))))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::elevation_limit::MAX_ELEVATION_CELLS;
 use super::grid_limit::MAX_GRID_CELLS;
 use crate::lattice::Lattice;
 
@@ -47,6 +48,16 @@ pub enum ProjectionError {
     )]
     #[expect(missing_docs, reason = "the message names the fields")]
     TooLarge { width: u64, height: u64 },
+    /// Elevation map with too many cells for a message.
+    #[error(
+        "an elevation map of {width} x {height} cells exceeds {MAX_ELEVATION_CELLS} cells: set a smaller \
+         `elevation_length_m`, or a larger `resolution_m`"
+    )]
+    #[expect(missing_docs, reason = "the message names the fields")]
+    TooManyHeights { width: u64, height: u64 },
+    /// Rule without surfaces.
+    #[error("elevation needs ground that is found: set `ground: found`")]
+    FlatRule,
 }
 
 /// Robot on the ground.

@@ -1,13 +1,10 @@
 //! Surfaces that the robot reaches.
 
 use nalgebra::Vector3;
-use rustc_hash::FxHashMap;
 
-use super::columns::Column;
+use super::GroundOptions;
 use super::grid::Grid;
 use super::surface_graph::SurfaceGraph;
-use super::surfaces::ColumnState;
-use super::{GroundOptions, ProjectionError};
 
 /// Reached surface of each column, nearest in height to that of the robot.
 pub(super) struct Reached {
@@ -19,12 +16,10 @@ pub(super) struct Reached {
 
 impl Reached {
     pub(super) fn new(
-        states: &FxHashMap<Column, ColumnState>,
-        resolution_m: f64,
+        graph: &SurfaceGraph,
         ground: &GroundOptions,
         robot_m: Option<Vector3<f64>>,
-    ) -> Result<Reached, ProjectionError> {
-        let graph = SurfaceGraph::new(states, resolution_m, ground)?;
+    ) -> Reached {
         let start = graph.start(ground, robot_m);
         let drawn = (0..graph.grid.cells.len()).map(|cell| {
             let (component, height_m) = start?;
@@ -35,9 +30,9 @@ impl Reached {
             let from_robot_m = |at: &Vector3<f64>| (at.z - height_m).abs();
             reached.min_by(|a, b| from_robot_m(a).total_cmp(&from_robot_m(b)))
         });
-        Ok(Reached {
+        Reached {
             drawn: drawn.collect(),
-            grid: graph.grid,
-        })
+            grid: graph.grid.clone(),
+        }
     }
 }

@@ -3,11 +3,10 @@
 use std::collections::VecDeque;
 
 use nalgebra::Vector3;
-use rustc_hash::FxHashMap;
 
-use super::columns::Column;
 use super::grid::Grid;
 use super::surfaces::ColumnState;
+use super::tiles::Tiles;
 use super::{GroundOptions, ProjectionError};
 
 /// Area below which a connected surface is no ground, m^2, unless there is no larger one: tables, crates, vehicles.
@@ -51,14 +50,14 @@ pub(super) fn beside(grid: &Grid, i: usize, [dx, dy]: [i32; 2]) -> Option<usize>
 
 impl SurfaceGraph {
     pub(super) fn new(
-        states: &FxHashMap<Column, ColumnState>,
+        states: &Tiles<ColumnState>,
         resolution_m: f64,
         ground: &GroundOptions,
     ) -> Result<SurfaceGraph, ProjectionError> {
-        let grid = Grid::around(states.keys().copied(), resolution_m)?;
+        let grid = Grid::around(states.iter().map(|(column, _)| column), resolution_m)?;
         let mut by_cell: Vec<Option<&ColumnState>> = vec![None; grid.cells.len()];
-        for (column, state) in states {
-            if let Some(cell) = grid.index(*column).and_then(|i| by_cell.get_mut(i)) {
+        for (column, state) in states.iter() {
+            if let Some(cell) = grid.index(column).and_then(|i| by_cell.get_mut(i)) {
                 *cell = Some(state);
             }
         }

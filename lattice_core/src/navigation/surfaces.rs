@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 
 use super::GroundOptions;
-use super::columns::{Column, Columns};
+use super::columns::Columns;
+use super::tiles::Column;
 
 /// Top of a span of matter in a column, with room for the robot above it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,9 +15,14 @@ pub(super) struct Surface {
     pub(super) slope: f64,
     /// Height of the step at the column, metres.
     pub(super) step_m: f64,
+    /// Distance to the lowest sample above, metres; infinite without any.
+    pub(super) clearance_m: f64,
     /// True if slope and step are within the limits of the robot.
     pub(super) is_standable: bool,
 }
+
+/// Samples of a surface, as offsets from the centre of their column in x and y and as heights.
+pub(super) type Layer = Vec<Vector3<f64>>;
 
 /// Surfaces and matter of a column with samples.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -45,7 +51,7 @@ fn spans<'a>(
 }
 
 /// Samples of a span within a step of its top that no other sample covers: the underside of a deck is none of them.
-fn layer(columns: &Columns, span: &[Vector3<f64>], ground: &GroundOptions) -> Vec<Vector3<f64>> {
+fn layer(columns: &Columns, span: &[Vector3<f64>], ground: &GroundOptions) -> Layer {
     let top_m = span.last().map_or(0.0, |sample| sample.z);
     let low_m = top_m - layer_m(columns, ground);
     let begin = span.partition_point(|sample| sample.z < low_m);
@@ -81,37 +87,56 @@ fn surrounds(layer: &[Vector3<f64>]) -> bool {
 }
 
 /// Layers of samples that are surfaces, in the order of [`ColumnState::surfaces`].
-pub(super) fn layers(
-    columns: &Columns,
-    window: &[Vector3<f64>],
-    ground: &GroundOptions,
-) -> impl Iterator<Item = Vec<Vector3<f64>>> {
+fn layers(columns: &Columns, window: &[Vector3<f64>], ground: &GroundOptions) -> Vec<Layer> {
     let layers = spans(columns, window, ground).map(|span| layer(columns, span, ground));
-    layers.filter(|layer| surrounds(layer))
+    layers.filter(|layer| surrounds(layer)).collect()
 }
 
-/// State of a column; `None` without samples.
+/// Layers of the surfaces of a column.
+pub(super) fn layers_of(columns: &Columns, column: Column, ground: &GroundOptions) -> Vec<Layer> {
+    layers(columns, &columns.window(column), ground)
+}
+
+/// State of a column and the layers of its surfaces; `None` without samples.
 pub(super) fn of_column(
     columns: &Columns,
     column: Column,
     ground: &GroundOptions,
-) -> Option<ColumnState> {
+) -> Option<(ColumnState, Vec<Layer>)> {
     let window = columns.window(column);
     let tall_m = layer_m(columns, ground);
-    let surface = |layer: Vec<Vector3<f64>>| Surface {
-        at_m: mean(columns, column, &layer),
+    let surface = |layer: &Layer, at_m: Vector3<f64>| Surface {
+        at_m,
         slope: 0.0,
         step_m: 0.0,
+        clearance_m: clearance_m(&window, layer, at_m.z),
         is_standable: false,
     };
     let tall = |span: &[Vector3<f64>]| match span {
         [low, .., high] if high.z - low.z > tall_m => Some([low.z, high.z]),
         _ => None,
     };
-    (!window.is_empty()).then(|| ColumnState {
-        surfaces: layers(columns, &window, ground).map(surface).collect(),
-        tall_m: spans(columns, &window, ground).filter_map(tall).collect(),
+    (!window.is_empty()).then(|| {
+        let layers = layers(columns, &window, ground);
+        let state = ColumnState {
+            surfaces: layers
+                .iter()
+                .map(|layer| surface(layer, mean(columns, column, layer)))
+                .collect(),
+            tall_m: spans(columns, &window, ground).filter_map(tall).collect(),
+        };
+        (state, layers)
     })
+}
+
+/// Distance from a surface to the lowest sample of a window above its layer, metres; infinite without any.
+fn clearance_m(window: &[Vector3<f64>], layer: &[Vector3<f64>], z_m: f64) -> f64 {
+    // The top of a span is the last one of its layer, as nothing covers it.
+    let top_m = layer.last().map_or(z_m, |sample| sample.z);
+    let above = window.partition_point(|sample| sample.z <= top_m);
+    window
+        .get(above)
+        .map_or(f64::INFINITY, |sample| sample.z - z_m)
 }
 
 /// Mean of samples, weighted by their distance from the border of the window.

@@ -1,11 +1,11 @@
 //! Slope and step of surfaces.
 
 use nalgebra::Vector3;
-use rustc_hash::FxHashMap;
 
 use super::GroundOptions;
-use super::columns::{Column, Columns};
-use super::surfaces::{ColumnState, Surface, layers};
+use super::columns::Columns;
+use super::surfaces::{ColumnState, Layer, Surface};
+use super::tiles::{Column, Tiles};
 
 /// Strides on each side from which the inclination beyond a step is taken.
 pub(super) const REACH: i32 = 4;
@@ -14,7 +14,7 @@ const BASELINE: i32 = 2;
 /// Part of a limit by which rounding may exceed it.
 const SLACK: f64 = 1e-9;
 
-type States = FxHashMap<Column, ColumnState>;
+type States = Tiles<ColumnState>;
 
 /// Slope and step of a surface.
 pub(super) struct Terrain {
@@ -23,23 +23,21 @@ pub(super) struct Terrain {
     pub(super) is_standable: bool,
 }
 
-/// Terrain of each surface of a column.
+/// Terrain of each surface of a column, from their layers.
 pub(super) fn standable(
     columns: &Columns,
     states: &States,
     column: Column,
+    layers: &[Layer],
     ground: &GroundOptions,
 ) -> Vec<Terrain> {
-    let surfaces = states.get(&column).map_or(&[][..], |state| &state.surfaces);
-    if surfaces.is_empty() {
-        return Vec::new();
-    }
-    let window = columns.window(column);
-    let judge = |(surface, layer): (&Surface, Vec<Vector3<f64>>)| {
+    let surfaces = states.get(column).map_or(&[][..], |state| &state.surfaces);
+    let link_m = ground.max_link_m(columns.resolution_m);
+    let judge = |(surface, layer): (&Surface, &Layer)| {
         let [x, y] =
-            [0, 1].map(|axis| Profile::new(columns, states, column, surface, axis, ground));
+            [0, 1].map(|axis| Profile::new(columns, states, column, surface, axis, link_m));
         let slope = x.inclination().hypot(y.inclination());
-        let step_m = step_m(&layer, &x.beyond(ground), &y.beyond(ground));
+        let step_m = step_m(layer, &x.beyond(ground), &y.beyond(ground));
         let within = |value: f64, limit: f64| value <= limit * (1.0 + SLACK);
         Terrain {
             slope,
@@ -47,7 +45,6 @@ pub(super) fn standable(
             is_standable: within(slope, ground.max_rise()) && within(step_m, ground.max_step_m),
         }
     };
-    let layers = layers(columns, &window, ground);
     surfaces.iter().zip(layers).map(judge).collect()
 }
 
@@ -76,7 +73,7 @@ impl Profile {
         column: Column,
         surface: &Surface,
         axis: usize,
-        ground: &GroundOptions,
+        link_m: f64,
     ) -> Profile {
         let near = BASELINE * columns.stride();
         let side = |sign: i32| {
@@ -84,7 +81,7 @@ impl Profile {
             let mut inclination = || {
                 let from_m = at.1;
                 for _ in 0..near {
-                    at = next(columns, states, at, axis, sign, ground)?;
+                    at = next(states, at, axis, sign, link_m)?;
                 }
                 let apart_m = at.1[axis] - from_m[axis];
                 (apart_m.abs() > 0.5 * columns.resolution_m).then(|| (at.1.z - from_m.z) / apart_m)
@@ -118,21 +115,19 @@ impl Profile {
 
 /// Surface of the next column along an axis that continues a surface.
 fn next(
-    columns: &Columns,
     states: &States,
     (column, at_m): (Column, Vector3<f64>),
     axis: usize,
     sign: i32,
-    ground: &GroundOptions,
+    link_m: f64,
 ) -> Option<(Column, Vector3<f64>)> {
     let [x, y] = column;
     let column = match axis {
         0 => [x.checked_add(sign)?, y],
         _ => [x, y.checked_add(sign)?],
     };
-    let most_m = ground.max_link_m(columns.resolution_m);
     let rise_m = |surface: &&Surface| (surface.at_m.z - at_m.z).abs();
-    let surfaces = states.get(&column)?.surfaces.iter();
+    let surfaces = states.get(column)?.surfaces.iter();
     let nearest = surfaces.min_by(|a, b| rise_m(a).total_cmp(&rise_m(b)))?;
-    (rise_m(&nearest) <= most_m).then_some((column, nearest.at_m))
+    (rise_m(&nearest) <= link_m).then_some((column, nearest.at_m))
 }

@@ -6,7 +6,10 @@ use crate::lattice::LatticeKind;
 
 mod brute_paths;
 mod changes;
+mod elevation;
 mod paths;
+mod tiles;
+mod work;
 mod world;
 
 const SEEDS: u64 = 4;

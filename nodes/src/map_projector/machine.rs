@@ -1,18 +1,19 @@
 //! State machine of the projector, without I/O.
 
 use lattice_core::navigation::{
-    Cell, FreeCells, Grid, GroundMap, GroundPathError, ProjectionError, ProjectionRule, Projector,
+    Cell, Elevation, FreeCells, Grid, GroundMap, GroundPathError, ProjectionError, ProjectionRule,
+    Projector,
 };
+use lattice_msgs::grid_map_msgs::GridMap;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::map_msgs::OccupancyGridUpdate;
 use lattice_msgs::nav_msgs::OccupancyGrid;
 use lattice_msgs::std_msgs::Header;
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 
-use super::messages::grid_message;
+use super::counts::ProjectorCounts;
+use super::messages::{elevation_message, grid_message};
 use super::options::MapProjectorOptions;
-use super::plan_counts::PlanCounts;
 use super::window::Window;
 use super::{changes, messages};
 use crate::convert::geometry;
@@ -22,47 +23,6 @@ use crate::map_follower::{FollowError, Followed, FollowedMap, MapFollower};
 
 /// Distance that a robot moves before the grid is made anew without a change of the map, metres.
 const MOVED_M: f64 = 0.5;
-
-/// Counters of messages received and grids published.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ProjectorCounts {
-    /// Chunks of `voxel_map`, `voxel_map_updates` and `free` received.
-    pub messages_in: u64,
-    /// Chunks rejected as malformed or too large.
-    pub messages_refused: u64,
-    /// Keyframes needed.
-    pub gaps: u64,
-    /// Grids made for `projected_map`.
-    pub grids_out: u64,
-    /// Rectangles made for `projected_map_updates`.
-    pub updates_out: u64,
-    /// Grids not made because the map is too wide for their resolution, or the resolution does not fit the lattice.
-    pub grids_refused: u64,
-}
-
-/// Report of a `map_projector`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct ProjectorReport {
-    /// Counters of the state machine.
-    pub counts: ProjectorCounts,
-    /// Voxels of the followed map.
-    pub voxels: usize,
-    /// Cells of the last grid: free, occupied and unknown.
-    pub cells: [usize; 3],
-    /// Grids and updates dropped by the publishers.
-    pub grids_not_published: u64,
-    /// Map chunks rejected by a full inbox or overrun before it.
-    pub inbox_full: u64,
-    /// Map chunks lost on the network.
-    pub lost_on_network: u64,
-    /// Undecodable samples.
-    pub undecodable: u64,
-    /// Transforms that are not finite or do not fit the tree.
-    pub transforms_refused: u64,
-    /// Goals of the planner.
-    #[serde(default)]
-    pub plans: PlanCounts,
-}
 
 /// Messages of one change of the grid.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,8 +43,12 @@ pub struct MapProjector {
     changed: bool,
     robot_m: Option<Vector3<f64>>,
     grid: Option<Grid>,
+    /// True if elevation is made with each grid.
+    draws_elevation: bool,
+    elevation: Option<Elevation>,
     counts: ProjectorCounts,
     error: Option<ProjectionError>,
+    elevation_error: Option<ProjectionError>,
 }
 
 impl MapProjector {
@@ -97,8 +61,11 @@ impl MapProjector {
             changed: false,
             robot_m: None,
             grid: None,
+            draws_elevation: false,
+            elevation: None,
             counts: ProjectorCounts::default(),
             error: None,
+            elevation_error: None,
             options,
         }
     }
@@ -125,6 +92,7 @@ impl MapProjector {
             self.projector = None;
             self.changed = true;
         }
+        self.changed |= self.options.elevation_length_m != options.elevation_length_m;
         self.options = options;
     }
 
@@ -158,6 +126,14 @@ impl MapProjector {
             self.robot_m = Some(robot_m);
             self.changed = true;
         }
+    }
+
+    /// Sets whether elevation is made with each grid; the first one comes with the next call of
+    /// [`MapProjector::take_change`].
+    pub fn draw_elevation(&mut self, draws: bool) {
+        let draws = draws && self.options.has_ground();
+        self.changed |= draws && !self.draws_elevation;
+        self.draws_elevation = draws;
     }
 
     /// True if a keyframe is to be requested because an incomplete one has timed out. To be called once a second.
@@ -203,6 +179,18 @@ impl MapProjector {
         Some(change)
     }
 
+    /// Elevation that was made with the last grid, once.
+    pub fn take_elevation(&mut self) -> Option<GridMap> {
+        let (elevation, map) = (self.elevation.take()?, self.follower.map()?);
+        self.counts.elevations_out += 1;
+        Some(elevation_message(&elevation, header_of(map)))
+    }
+
+    /// True if elevation is not made for want of the robot's position.
+    pub fn misses_robot(&self) -> bool {
+        self.draws_elevation && self.options.elevation_square(self.robot_m).is_none()
+    }
+
     /// The last grid as a whole, such as for late joiners.
     pub fn whole_grid(&mut self) -> Option<OccupancyGrid> {
         let (grid, map) = (self.grid.as_ref()?, self.follower.map()?);
@@ -229,13 +217,27 @@ impl MapProjector {
         let free = self
             .free
             .map()
-            .filter(|_| self.options.needs_free())
+            .filter(|_| !self.options.has_ground())
             .map(|free| FreeCells {
                 lattice: free.lattice.clone(),
                 datum_m: free.datum_m,
                 keys: free.voxels().keys().copied().collect(),
             });
-        let grid = projector.grid(self.robot_m, free.as_ref())?;
+        let square = self.options.elevation_square(self.robot_m);
+        let (grid, elevation) = match square.filter(|_| self.draws_elevation) {
+            Some(square) => {
+                let (grid, elevation) = projector.grid_and_elevation(self.robot_m, square)?;
+                (grid, Some(elevation))
+            }
+            None => (projector.grid(self.robot_m, free.as_ref())?, None),
+        };
+        (self.elevation, self.elevation_error) = match elevation.transpose() {
+            Ok(elevation) => (elevation, None),
+            Err(error) => {
+                self.counts.elevations_refused += 1;
+                (None, Some(error))
+            }
+        };
         let known = Window::of(&grid);
         let room = (self.options.room_m / grid.resolution_m).ceil() as u32;
         let before = self.grid.as_ref();
@@ -265,9 +267,9 @@ impl MapProjector {
         &self.counts
     }
 
-    /// Error of the last grid, if it was not made.
+    /// Error of the last grid, or of its elevation, if it was not made.
     pub fn error(&self) -> Option<&ProjectionError> {
-        self.error.as_ref()
+        self.error.as_ref().or(self.elevation_error.as_ref())
     }
 
     /// Number of voxels of the followed map; 0 before its first keyframe.

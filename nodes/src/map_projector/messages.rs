@@ -1,10 +1,11 @@
-//! Messages of a grid.
+//! Messages of a grid, and of elevation.
 
-use lattice_core::navigation::{Cell, Grid};
+use lattice_core::navigation::{Cell, Elevation, Grid};
 use lattice_msgs::geometry_msgs::Pose;
+use lattice_msgs::grid_map_msgs::{GridMap, GridMapInfo};
 use lattice_msgs::map_msgs::OccupancyGridUpdate;
 use lattice_msgs::nav_msgs::{MapMetaData, OccupancyGrid};
-use lattice_msgs::std_msgs::Header;
+use lattice_msgs::std_msgs::{Float32MultiArray, Header, MultiArrayDimension, MultiArrayLayout};
 
 use super::changes::Part;
 
@@ -45,5 +46,49 @@ pub(super) fn update(grid: &Grid, part: &Part, header: Header) -> OccupancyGridU
         width: part.width as u32,
         height: part.height as u32,
         data: rows.flatten().map(|cell| percent(*cell)).collect(),
+    }
+}
+
+/// Layers as grid_map has them: column-major, with x along the rows and y along the columns, both from the greatest
+/// coordinate down.
+pub fn elevation_message(elevation: &Elevation, header: Header) -> GridMap {
+    let (rows, columns) = (elevation.width, elevation.height);
+    let [length_x, length_y] = [rows, columns].map(|count| count as f64 * elevation.resolution_m);
+    let [x, y] = elevation
+        .corner
+        .map(|i| f64::from(i) * elevation.resolution_m);
+    let mut pose = Pose::default();
+    (pose.position.x, pose.position.y) = (x + 0.5 * length_x, y + 0.5 * length_y);
+    pose.orientation.w = 1.0;
+    let dimension = |label: &str, size: usize, stride: usize| MultiArrayDimension {
+        label: label.to_owned(),
+        size: size as u32,
+        stride: stride as u32,
+    };
+    let array = |values: &[f32]| Float32MultiArray {
+        layout: MultiArrayLayout {
+            dim: vec![
+                dimension("column_index", columns, rows * columns),
+                dimension("row_index", rows, rows),
+            ],
+            data_offset: 0,
+        },
+        // Row by row from the lowest y, x fastest, is that order backwards.
+        data: values.iter().rev().copied().collect(),
+    };
+    let layers = elevation.layers();
+    GridMap {
+        header,
+        info: GridMapInfo {
+            resolution: elevation.resolution_m,
+            length_x,
+            length_y,
+            pose,
+        },
+        layers: layers.iter().map(|(name, _)| (*name).to_owned()).collect(),
+        basic_layers: vec!["elevation".to_owned()],
+        data: layers.iter().map(|(_, values)| array(values)).collect(),
+        outer_start_index: 0,
+        inner_start_index: 0,
     }
 }

@@ -3,61 +3,33 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
-use lattice_msgs::map_msgs::OccupancyGridUpdate;
-use lattice_msgs::nav_msgs::OccupancyGrid;
-use lattice_msgs::nav2_msgs::{ComputePathToPoseAction, ComputePathToPoseGoal};
-use lattice_msgs::tf2_msgs::TFMessage;
+use lattice_msgs::nav2_msgs::ComputePathToPoseAction;
 
 use super::diagnosis::diagnosis;
+use super::inputs::{Event, Inputs};
+use super::outputs::Outputs;
 use super::parameters::Settings;
 use super::planner::Planner;
 use super::robot::RobotPosition;
 use super::{MapProjector, Projected, ProjectorReport};
-use crate::compute::{Compute, Inbox};
+use crate::compute::Compute;
 use crate::hurry::Hurry;
 use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
 use crate::start::{Finish, LAST_EVENTS, LAST_FLUSH, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{
-    ActionLimits, Diagnostics, GoalHandle, Node, Publisher, Runtime, RuntimeError, Subscription,
-    SubscriptionExecutor, Undecoded,
-};
+use lattice_runtime::{ActionLimits, Diagnostics, Runtime};
 
 /// Time without a subscriber after which the map is no longer followed.
 const IDLE: Duration = Duration::from_secs(10);
-
-/// Event for the compute thread.
-enum Event {
-    /// Means of the thread to open and close its subscriptions by demand.
-    Inputs(Box<Inputs>),
-    Map(Undecoded<LatticeMap>),
-    Update(Undecoded<LatticeMapUpdate>),
-    Free(Undecoded<LatticeMap>),
-    Transforms(Arc<TFMessage>, bool),
-    Joined,
-    Project,
-    Goal(
-        Box<ComputePathToPoseGoal>,
-        GoalHandle<ComputePathToPoseAction>,
-    ),
-    /// A goal was canceled, or a search has ended.
-    Plan,
-    Settings(Box<Settings>),
-    Finish,
-}
 
 /// Starts the node.
 pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let node = runtime.node(name)?;
     let params = node.params();
     let settings = Settings::from_params(params)?;
-    let outputs = Outputs {
-        grid: node.publisher("projected_map", Qos::LATCHED)?,
-        updates: node.publisher("projected_map_updates", Qos::DEFAULT)?,
-    };
+    let outputs = Outputs::new(&node, settings.projector.has_ground())?;
     let (losses, hurry) = (MapLosses::default(), Hurry::default());
     let requests = MapRequests::new(&node, &settings.mapper, &losses)?;
     let planner = match settings.plan {
@@ -72,7 +44,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         planner,
         draws: false,
         robot: RobotPosition::new(settings.base_frame),
-        needs_free: settings.projector.needs_free(),
+        needs_free: !settings.projector.has_ground(),
         machine: MapProjector::new(settings.projector).hurried_by(&hurry),
         outputs: outputs.clone(),
         diagnostics: node.diagnostics(),
@@ -102,6 +74,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     outputs.grid.on_subscriber_joined(move || {
         let _ = joined.send(Event::Joined, 0);
     });
+    if let Some(elevation) = &outputs.elevation {
+        let joined = inbox.clone();
+        elevation.on_subscriber_joined(move || {
+            let _ = joined.send(Event::ElevationJoined, 0);
+        });
+    }
     let action = match settings.plan {
         true => {
             let (goals, canceled) = (inbox.clone(), inbox.clone());
@@ -137,58 +115,6 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }))
 }
 
-/// The topics of the node.
-#[derive(Clone)]
-struct Outputs {
-    grid: Publisher<OccupancyGrid>,
-    updates: Publisher<OccupancyGridUpdate>,
-}
-
-/// Subscriptions that are open while somebody subscribes to the grid, or wants a path.
-struct Inputs {
-    node: Node,
-    inbox: Inbox<Event>,
-    losses: MapLosses,
-    open: Vec<Subscription>,
-}
-
-impl Inputs {
-    fn open(&mut self, with_free: bool) -> Result<(), RuntimeError> {
-        let mut open =
-            Vec::from(
-                self.losses
-                    .subscribe(&self.node, &self.inbox, Event::Map, Event::Update)?,
-            );
-        if with_free {
-            let bytes = |map: &Undecoded<LatticeMap>| map.bytes(|map| map.keys.len());
-            let handler = self
-                .inbox
-                .counting(&self.losses.at_inbox, Event::Free, bytes);
-            let shared = SubscriptionExecutor::Shared;
-            open.push(
-                self.node
-                    .subscribe_undecoded("free", Qos::MAP, shared, handler)?,
-            );
-        }
-        for (topic, qos, is_static) in [
-            ("/tf", Qos::TF, false),
-            ("/tf_static", Qos::TF_STATIC_LISTENER, true),
-        ] {
-            let inbox = self.inbox.clone();
-            // Transforms count no bytes: a map must not keep them out.
-            let handler = move |message: Arc<TFMessage>| {
-                let _ = inbox.send(Event::Transforms(message, is_static), 0);
-            };
-            open.push(
-                self.node
-                    .subscribe(topic, qos, SubscriptionExecutor::Shared, handler)?,
-            );
-        }
-        self.open = open;
-        Ok(())
-    }
-}
-
 /// State of the compute thread.
 struct ComputeState {
     requests: MapRequests,
@@ -197,12 +123,12 @@ struct ComputeState {
     needs_free: bool,
     outputs: Outputs,
     planner: Option<Planner>,
-    /// True once somebody has subscribed to the grid since the map is followed.
+    /// True once somebody has subscribed to grid or elevation since the map is followed.
     draws: bool,
     diagnostics: Diagnostics,
     seconds: Throttle,
     inputs: Option<Inputs>,
-    /// Last time at which somebody subscribed to the grid, or wanted a path.
+    /// Last time at which somebody subscribed to an output, or wanted a path.
     wanted: Instant,
     grid_period: Duration,
     /// Time of the next whole grid, if one is due for a subscriber without updates.
@@ -243,6 +169,10 @@ impl ComputeState {
                 self.grid_due = Some(Instant::now());
                 self.project();
             }
+            Event::ElevationJoined => {
+                self.follow_by_demand();
+                self.project();
+            }
             Event::Project => {
                 self.follow_by_demand();
                 self.requests.make_good();
@@ -264,13 +194,12 @@ impl ComputeState {
         }
     }
 
-    /// Subscribes to the map while somebody subscribes to the grid, or wants a path.
+    /// Subscribes to the map while somebody subscribes to an output, or wants a path.
     fn follow_by_demand(&mut self) {
         let Some(inputs) = &mut self.inputs else {
             return;
         };
-        let subscribers =
-            self.outputs.grid.subscriber_count() + self.outputs.updates.subscriber_count();
+        let subscribers = self.outputs.subscribers();
         self.draws |= subscribers > 0;
         if subscribers > 0 || self.planner.as_ref().is_some_and(Planner::is_wanted) {
             self.wanted = Instant::now();
@@ -311,18 +240,20 @@ impl ComputeState {
         if let Some(robot_m) = robot_m {
             self.machine.set_robot(robot_m);
         }
-        match self.machine.take_change() {
+        let draws_elevation = self.outputs.elevation_subscribers() > 0;
+        self.machine.draw_elevation(draws_elevation);
+        let change = self.machine.take_change();
+        if let Some(elevation) = self.machine.take_elevation() {
+            self.outputs.publish_elevation(elevation);
+        }
+        match change {
             None => {}
             Some(Projected::Grid(grid)) => {
                 self.grid_due = None;
-                self.publish_grid(grid);
+                self.outputs.publish_grid(grid);
             }
             Some(Projected::Updates(updates)) => {
-                for update in updates {
-                    if let Err(error) = self.outputs.updates.publish(update) {
-                        log::debug!("update not published: {error}");
-                    }
-                }
+                self.outputs.publish_updates(updates);
                 let takes_no_updates =
                     self.outputs.grid.subscriber_count() > self.outputs.updates.subscriber_count();
                 if takes_no_updates && self.grid_due.is_none() {
@@ -338,13 +269,7 @@ impl ComputeState {
     fn publish_whole(&mut self) {
         self.grid_due = None;
         if let Some(grid) = self.machine.whole_grid() {
-            self.publish_grid(grid);
-        }
-    }
-
-    fn publish_grid(&self, grid: OccupancyGrid) {
-        if let Err(error) = self.outputs.grid.publish(grid) {
-            log::debug!("grid not published: {error}");
+            self.outputs.publish_grid(grid);
         }
     }
 
@@ -354,7 +279,7 @@ impl ComputeState {
             counts: self.machine.counts().clone(),
             voxels: self.machine.voxels(),
             cells: self.machine.cells(),
-            grids_not_published: self.outputs.grid.dropped() + self.outputs.updates.dropped(),
+            grids_not_published: self.outputs.dropped(),
             inbox_full: losses.inbox_full(),
             lost_on_network: losses.on_network(),
             undecodable: losses.undecodable(),
@@ -382,10 +307,7 @@ impl ComputeState {
 
     fn finish(&mut self) {
         self.project();
-        let begin = Instant::now();
-        self.outputs.grid.flush(LAST_FLUSH);
-        let left = LAST_FLUSH.saturating_sub(begin.elapsed());
-        self.outputs.updates.flush(left);
+        self.outputs.flush(LAST_FLUSH);
         self.inputs = None;
         if let Err(error) = report::write(&self.report_file, &self.report(), &self.diagnostics) {
             log::error!("{error}");

@@ -1,8 +1,9 @@
 //! Options of the projector.
 
 use lattice_core::navigation::{
-    GroundOptions, GroundPathOptions, ProjectionRule, ProjectorOptions,
+    GroundOptions, GroundPathOptions, ProjectionRule, ProjectorOptions, Square,
 };
+use nalgebra::Vector3;
 
 use crate::options::one_of;
 use lattice_runtime::params::{ParamError, Params};
@@ -14,6 +15,8 @@ pub struct MapProjectorOptions {
     pub projector: ProjectorOptions,
     /// Room around a grid that has to grow, m.
     pub room_m: f64,
+    /// Edge of the square about the robot that elevation has, m; 0: the whole grid.
+    pub elevation_length_m: f64,
     /// Voxel limit of the followed map.
     pub max_voxels: usize,
 }
@@ -23,6 +26,7 @@ impl Default for MapProjectorOptions {
         Self {
             projector: ProjectorOptions::default(),
             room_m: 20.0,
+            elevation_length_m: 20.0,
             max_voxels: 20_000_000,
         }
     }
@@ -55,6 +59,11 @@ impl MapProjectorOptions {
                 },
             },
             room_m: params.f64_in("room_m", defaults.room_m, 0.0..=10_000.0)?,
+            elevation_length_m: params.f64_in(
+                "elevation_length_m",
+                defaults.elevation_length_m,
+                0.0..=10_000.0,
+            )?,
             max_voxels: params.positive("max_voxels", defaults.max_voxels)?,
         })
     }
@@ -74,8 +83,20 @@ impl MapProjectorOptions {
         })
     }
 
-    /// True if the rule needs free cells.
-    pub fn needs_free(&self) -> bool {
-        matches!(self.projector.rule, ProjectionRule::Flat { .. })
+    /// True if the rule finds ground; the other one needs free cells.
+    pub fn has_ground(&self) -> bool {
+        matches!(self.projector.rule, ProjectionRule::Ground(_))
+    }
+
+    /// Square that elevation has, or the whole grid; `None` while the robot's position is missing for it.
+    pub(super) fn elevation_square(&self, robot_m: Option<Vector3<f64>>) -> Option<Option<Square>> {
+        let length_m = self.elevation_length_m;
+        if length_m == 0.0 {
+            return Some(None);
+        }
+        robot_m.map(|robot_m| {
+            let center_m = [robot_m.x, robot_m.y];
+            Some(Square { center_m, length_m })
+        })
     }
 }

@@ -23,6 +23,7 @@ const ABOUT: &[About] = about! {
     "plan" fixed("its action is made at the start"): "Whether the action compute_path_to_pose plans paths on the ground, in place of Nav2's planner_server; not with ground: flat.";
     "robot_radius_m": "Radius of the robot: paths keep it away from obstacles, edges and unseen ground.";
     "plan_tolerance_m": "Distance by which start and goal of a path may move to ground with room for the robot.";
+    "elevation_length_m": "Edge of the square about the robot that elevation has; 0: the whole grid.";
     "room_m": "Room on each side of a grid that has to grow.";
     "update_period_s": "Shortest time between two changes of the grid.";
     "grid_period_s": "Shortest time between two whole grids where a subscriber of projected_map takes no updates.";

@@ -5,6 +5,7 @@ mod actions;
 mod calibration;
 mod conformance;
 mod cyclone;
+mod elevation;
 mod forged_maps;
 mod fresh_clients;
 mod ground_plan;

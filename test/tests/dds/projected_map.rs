@@ -143,4 +143,5 @@ fn foreign_subscribers_rebuild_the_grid_from_grids_and_updates() {
         report.counts.grids_refused + report.counts.messages_refused,
         0
     );
+    assert_eq!(report.counts.elevations_out, 0, "nobody subscribes to it");
 }

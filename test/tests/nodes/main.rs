@@ -2,6 +2,7 @@
 
 mod cloud_input;
 mod counters;
+mod elevation;
 mod enu_transformer;
 mod free_space;
 mod headset_cloud;

@@ -66,7 +66,7 @@ const LAYERS: [(&str, &str); 26] = [
     ),
     (
         "nodes/src/map_projector",
-        "changes messages options parameters plan plan_counts robot window machine diagnosis planner node",
+        "changes messages options parameters plan plan_counts counts robot window machine diagnosis planner inputs outputs node",
     ),
     (
         "nodes/src/replay",

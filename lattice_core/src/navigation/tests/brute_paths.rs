@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use proptest::prelude::*;
-use rustc_hash::FxHashMap;
 
 use super::super::robot_room::open_nodes;
 use super::super::surface_graph::{CORNERS, EDGES, SurfaceGraph};
@@ -17,7 +16,7 @@ const RESOLUTION_M: f64 = 0.25;
 
 /// Graph of random steps, holes, curbs and upper floors.
 fn terrain(random: &mut Random, side: i32) -> SurfaceGraph {
-    let mut states = FxHashMap::default();
+    let mut states = Tiles::default();
     for (x, y) in (0..side).flat_map(|x| (0..side).map(move |y| (x, y))) {
         let heights_m: &[f64] = match random.next() {
             hole if hole < 0.12 => &[],
@@ -35,11 +34,12 @@ fn terrain(random: &mut Random, side: i32) -> SurfaceGraph {
             ),
             slope: 0.0,
             step_m: 0.0,
+            clearance_m: f64::INFINITY,
             is_standable: true,
         };
         let surfaces = heights_m.iter().map(surface).collect();
         let tall_m = Vec::new();
-        states.insert([x, y], ColumnState { surfaces, tall_m });
+        states.set([x, y], Some(ColumnState { surfaces, tall_m }));
     }
     SurfaceGraph::new(&states, RESOLUTION_M, &GroundOptions::default()).unwrap()
 }

@@ -54,6 +54,16 @@ proptest! {
                 projector.grid(robot_m, None).unwrap(),
                 fresh.grid(robot_m, None).unwrap()
             );
+            match (projector.grid_and_elevation(robot_m, None), fresh.grid_and_elevation(robot_m, None)) {
+                (Err(error), _) => prop_assert!(is_flat && error == ProjectionError::FlatRule),
+                (found, wanted) => {
+                    let bits = |found: Result<(Grid, Result<Elevation, _>), ProjectionError>| {
+                        let layers = found.unwrap().1.unwrap();
+                        layers.layers().map(|(_, layer)| layer.iter().map(|value| value.to_bits()).collect::<Vec<_>>())
+                    };
+                    prop_assert_eq!(bits(found), bits(wanted));
+                }
+            }
         }
         map.keys().for_each(|key| projector.set(*key, None));
         let empty = projector.grid(None, None).unwrap();

@@ -89,6 +89,8 @@ fn a_projector_counts_messages_grids_and_updates() {
         ("messages_refused", 1),
         ("gaps", 1),
         ("grids_refused", 0),
+        ("elevations_out", 0),
+        ("elevations_refused", 0),
         ("grids_not_published", 0),
         ("transforms_refused", 1),
         ("inbox_full", 0),
