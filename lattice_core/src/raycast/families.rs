@@ -207,7 +207,7 @@ impl<const P: usize> Walk<P> {
         let untagged = f64x2::splat(f64::from_bits(!TAG));
         let pair = |j: usize| {
             let two = |values: &[f64; P]| f64x2::new([values[j], values[j + 1]]);
-            two(&self.q) * two(&self.inverse) & untagged | two(&self.tag)
+            ((two(&self.q) * two(&self.inverse)) & untagged) | two(&self.tag)
         };
         let mut least = pair(0);
         for j in (2..P).step_by(2) {

@@ -84,12 +84,17 @@ impl Part {
 }
 
 impl Marks {
-    /// Creates marks within limits of memory; half of it is for the parts of threads.
+    /// Creates marks within limits of memory; half of it is for the parts of threads, if that is enough for two.
     pub(super) fn new(lattice: &Lattice, bytes: MarkBytes) -> Marks {
+        let has_parts = bytes.masks / 2 >= 2 * BYTES_OF_PART;
+        let (all, parts_bytes) = match has_parts {
+            true => (bytes.over(2), bytes.over(2)),
+            false => (bytes, bytes.over(usize::MAX)),
+        };
         Marks {
-            all: Part::new(lattice, bytes.over(2)),
+            all: Part::new(lattice, all),
             parts: Vec::new(),
-            parts_bytes: bytes.over(2),
+            parts_bytes,
         }
     }
 
