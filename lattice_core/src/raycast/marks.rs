@@ -254,7 +254,11 @@ mod tests {
         let at = |i: u32| {
             let up = 1.0 - 2.0 * (f64::from(i) + 0.5) / f64::from(points);
             let (flat, turn) = ((1.0 - up * up).sqrt(), 2.399_963 * f64::from(i));
-            let radius_m = if i % 7 == 0 { 0.4 * radius_m } else { radius_m };
+            let radius_m = if i.is_multiple_of(7) {
+                0.4 * radius_m
+            } else {
+                radius_m
+            };
             Vector3::new(flat * turn.cos(), flat * turn.sin(), up) * radius_m
         };
         let points: Vec<Vector3<f64>> = (0..points).map(at).collect();
