@@ -96,6 +96,8 @@ pub struct Projector {
     changed: ColumnSet,
     /// Surfaces of all floors, linked; `None` if they changed since it was made.
     graph: Option<Arc<SurfaceGraph>>,
+    /// Number of times that the samples of a column were gathered, of which the work is a multiple.
+    #[cfg(test)]
     gathered: u64,
 }
 
@@ -113,6 +115,7 @@ impl Projector {
             states: Tiles::default(),
             changed: ColumnSet::default(),
             graph: None,
+            #[cfg(test)]
             gathered: 0,
         })
     }
@@ -173,11 +176,6 @@ impl Projector {
         Ok(GroundMap::new(self.graph(&ground)?, ground))
     }
 
-    /// Number of times that the samples of a column were gathered since the start, of which the work is a multiple.
-    pub fn columns_gathered(&self) -> u64 {
-        self.gathered
-    }
-
     /// Linked surfaces of the map as it is.
     fn graph(&mut self, ground: &GroundOptions) -> Result<Arc<SurfaceGraph>, ProjectionError> {
         if !self.changed.is_empty() {
@@ -185,7 +183,11 @@ impl Projector {
             // Before surfaces are found on a map that is too wide for a grid.
             Grid::bounds(self.columns.occupied())?;
             let changed = std::mem::take(&mut self.changed);
-            self.gathered += refresh::refresh(&self.columns, &mut self.states, &changed, ground);
+            let _gathered = refresh::refresh(&self.columns, &mut self.states, &changed, ground);
+            #[cfg(test)]
+            {
+                self.gathered += _gathered;
+            }
         }
         if let Some(graph) = &self.graph {
             return Ok(Arc::clone(graph));

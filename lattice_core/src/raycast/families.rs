@@ -178,20 +178,8 @@ pub(super) struct Walk<const P: usize> {
 pub(super) struct Ray<const P: usize> {
     pub(super) walk: Walk<P>,
     pub(super) steps: u64,
-    /// Upper bound of the steps; 0 for a ray without steps.
+    /// Upper bound of the steps; 0 for a ray that has ended.
     pub(super) limit: u64,
-}
-
-impl<const P: usize> Ray<P> {
-    /// Makes a ray that has no steps.
-    pub(super) fn end(&mut self) {
-        (self.steps, self.limit) = (0, 0);
-        self.walk.end();
-    }
-
-    pub(super) fn has_ended(&self) -> bool {
-        self.limit == 0
-    }
 }
 
 impl<const P: usize> Walk<P> {

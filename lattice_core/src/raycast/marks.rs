@@ -86,10 +86,14 @@ impl Part {
 impl Marks {
     /// Creates marks within limits of memory; half of it is for the parts of threads, if that is enough for two.
     pub(super) fn new(lattice: &Lattice, bytes: MarkBytes) -> Marks {
-        let has_parts = bytes.masks / 2 >= 2 * BYTES_OF_PART;
-        let (all, parts_bytes) = match has_parts {
-            true => (bytes.over(2), bytes.over(2)),
-            false => (bytes, bytes.over(usize::MAX)),
+        let half = bytes.over(2);
+        let none = MarkBytes {
+            masks: 0,
+            surfaces: 0,
+        };
+        let (all, parts_bytes) = match half.masks >= 2 * BYTES_OF_PART {
+            true => (half, half),
+            false => (bytes, none),
         };
         Marks {
             all: Part::new(lattice, all),

@@ -49,13 +49,13 @@ pub(super) fn step_all<const P: usize>(
             match rays.next() {
                 Some(next) => (*ray, place.end, place.line) = (next.0, next.1.end, None),
                 None => {
-                    ray.end();
+                    ray.limit = 0;
                     has_ended = true;
                 }
             }
         }
         if has_ended {
-            lanes.retain(|(ray, _)| !ray.has_ended());
+            lanes.retain(|(ray, _)| ray.limit > 0);
         }
     }
     for (ray, place) in &mut lanes {

@@ -171,6 +171,8 @@ impl ComputeState {
             }
             Event::ElevationJoined => {
                 self.follow_by_demand();
+                // Made anew: it may take no messages of before.
+                self.machine.draw_elevation(false);
                 self.project();
             }
             Event::Project => {

@@ -110,6 +110,10 @@ fn elevation_is_made_only_where_it_is_drawn_and_follows_the_map() {
     send(&mut fresh, &mut mapper);
     assert_eq!(bits(&take(&mut fresh).unwrap()), bits(&second));
     assert_eq!(machine.counts().elevations_out, 2);
+    // A subscriber that joins gets it without a change of the map.
+    machine.draw_elevation(false);
+    machine.draw_elevation(true);
+    assert_eq!(bits(&take(&mut machine).unwrap()), bits(&second));
     // Nobody is left.
     machine.draw_elevation(false);
     machine.set_robot([4.0, 1.0, 0.3].into());

@@ -26,7 +26,7 @@ fn columns_are_gathered_once_and_again_only_around_changes() {
             panic!("no ground");
         };
         projector.ground_map().unwrap();
-        assert_eq!(projector.columns_gathered(), expected as u64, "{kind}");
+        assert_eq!(projector.gathered, expected as u64, "{kind}");
         // Neither a goal nor a robot that moved changes the surfaces.
         let graph = projector.graph(&ground).unwrap();
         projector.ground_map().unwrap();
@@ -36,17 +36,17 @@ fn columns_are_gathered_once_and_again_only_around_changes() {
         projector
             .grid(Some(Vector3::new(9.0, 1.0, 0.3)), None)
             .unwrap();
-        assert_eq!(projector.columns_gathered(), expected as u64, "{kind}");
+        assert_eq!(projector.gathered, expected as u64, "{kind}");
         assert!(Arc::ptr_eq(&graph, &projector.graph(&ground).unwrap()));
 
         let (key, voxel) = mapped.list.sorted()[1000];
         let offset_m = Vector3::from(voxel.mean_offset_m());
         projector.set(key, Some(offset_m));
         projector.ground_map().unwrap();
-        assert_eq!(projector.columns_gathered(), expected as u64, "no change");
+        assert_eq!(projector.gathered, expected as u64, "no change");
         projector.set(key, None);
         projector.ground_map().unwrap();
-        let again = projector.columns_gathered() - expected as u64;
+        let again = projector.gathered - expected as u64;
         assert!(
             (square(reach)..=square(reach + terrain::REACH * stride)).contains(&again),
             "{kind}: {again}"
