@@ -10,7 +10,9 @@ use crate::start::LAST_FLUSH;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Empty;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Node, Publisher, RuntimeError, Server, Subscription, SubscriptionExecutor};
+use lattice_runtime::{
+    Activity, Node, Publisher, RuntimeError, Server, Subscription, SubscriptionExecutor,
+};
 
 /// Keyframe chunks per update period: 3 MB.
 const CHUNKS_PER_ROUND: usize = 50;
@@ -30,6 +32,7 @@ pub struct MapOutput {
     /// Keyframe chunks that were left out since the node had to end.
     chunks_left_out: u64,
     hurry: Hurry,
+    activity: Activity,
 }
 
 /// Topic and service for keyframe requests; dropping it ends them.
@@ -51,6 +54,7 @@ impl MapOutput {
             chunks_waited: 0,
             chunks_left_out: 0,
             hurry: hurry.clone(),
+            activity: node.activity(),
         };
         let ask = || {
             let asked = Arc::clone(&output.asked);
@@ -115,6 +119,9 @@ impl MapOutput {
                 break;
             }
             self.pending.pop_front();
+        }
+        if !self.pending.is_empty() {
+            self.activity.note();
         }
     }
 

@@ -9,7 +9,7 @@
 //! | serve and call a service | [`Node::service`], [`Node::client`] |
 //! | serve an action | [`Node::action_server`] |
 //! | read parameters | [`Node::params`] |
-//! | run code in periods | [`Runtime::timer`] |
+//! | run code in periods | [`Runtime::timer`], [`Runtime::resting_timer`] |
 //! | manage states | [`lifecycle`] |
 //! | report to `/diagnostics` | [`Node::diagnostics`] |
 //! | be apart from all else on the machine, as in tests | [`LoopbackDomain`] |
@@ -23,6 +23,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod activity;
 mod communication;
 mod config;
 mod error;
@@ -34,6 +35,7 @@ mod sync;
 mod task_thread;
 mod transport;
 
+pub use activity::Activity;
 pub use communication::action::{ActionLimits, ActionServer, Feedback, GoalHandle};
 pub use communication::publisher::{Publisher, RawPublisher};
 pub use communication::service::{Reply, Server};

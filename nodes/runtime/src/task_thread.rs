@@ -75,7 +75,8 @@ impl Drop for TaskThread {
 }
 
 fn run(executor: &Executor<'static>, stopped: &Receiver<()>) {
-    smol::block_on(executor.run(async {
+    // Without the reactor of smol: where two threads wait for it, the second one looks ten times after each event.
+    smol::future::block_on(executor.run(async {
         // Ends when the sender closes.
         let _ = stopped.recv().await;
     }));

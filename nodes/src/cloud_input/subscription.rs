@@ -10,8 +10,8 @@ use lattice_msgs::{livox_interfaces, livox_ros_driver, livox_ros_driver2};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    Losses, Node, RemotePublisher, Runtime, RuntimeError, Subscription, SubscriptionExecutor,
-    Timer, lock,
+    Activity, Losses, Node, RemotePublisher, Runtime, RuntimeError, Subscription,
+    SubscriptionExecutor, Timer, lock,
 };
 
 use super::channels::cloud_of_channels;
@@ -68,6 +68,8 @@ struct Inputs {
     losses: Vec<Losses>,
     hand_over: Arc<HandOver>,
     inputs: Vec<Input>,
+    /// Noted while a type is changed.
+    activity: Activity,
 }
 
 struct Input {
@@ -92,13 +94,14 @@ impl CloudSubscriptions {
             losses: of.losses,
             hand_over: of.hand_over.into(),
             inputs: Vec::new(),
+            activity: node.activity(),
         };
         for topic in &of.topics {
             inputs.add(topic)?;
         }
         let inputs = Arc::new(Mutex::new(inputs));
         let checked = Arc::clone(&inputs);
-        let timer = runtime.timer(PERIOD, move || lock(&checked).follow_types());
+        let timer = runtime.resting_timer(PERIOD, move || lock(&checked).follow_types());
         Ok(Self {
             _timer: timer,
             inputs,
@@ -164,7 +167,7 @@ impl Inputs {
             match self.subscribe(&input.name, input.cloud_type) {
                 Ok(subscription) => input.subscription = Some(subscription),
                 // Until the subscription before has ended.
-                Err(RuntimeError::TypeMismatch { .. }) => {}
+                Err(RuntimeError::TypeMismatch { .. }) => self.activity.note(),
                 Err(error) => {
                     if input.warnings.check().is_some() {
                         log::warn!("{}: not subscribed: {error}", input.resolved);

@@ -84,6 +84,11 @@ impl EnuTransformer {
         out
     }
 
+    /// True if clouds wait for poses.
+    pub fn is_waiting(&self) -> bool {
+        self.waiting.len() > 0
+    }
+
     /// Ends the input: returns the clouds that poses cover, and counts the others by the reason of their drop.
     pub fn finish(&mut self) -> Vec<EnuOutput> {
         let mut out = Vec::new();

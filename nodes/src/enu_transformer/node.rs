@@ -22,8 +22,8 @@ use crate::start::{Finish, LAST_FLUSH, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    Clock, Diagnostics, Level, Losses, Node, Publisher, Runtime, StaticTfBroadcaster, Subscription,
-    SubscriptionExecutor, TfBroadcaster, TfGuard,
+    Activity, Clock, Diagnostics, Level, Losses, Node, Publisher, Runtime, StaticTfBroadcaster,
+    Subscription, SubscriptionExecutor, TfBroadcaster, TfGuard,
 };
 
 /// Event for the compute thread.
@@ -61,6 +61,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let [lost, lost_poses] = [(); 2].map(|()| Arc::new(AtomicU64::new(0)));
     let (lost_clouds, losses) = (Losses::default(), Losses::default());
     let mut compute_state = ComputeState {
+        activity: node.activity(),
         lost_clouds: lost_clouds.clone(),
         losses: losses.clone(),
         machine: EnuTransformer::new(settings.transformer),
@@ -107,7 +108,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     };
     let clouds = CloudSubscriptions::start(runtime, &node, of_clouds)?;
     let ticks = inbox.clone();
-    let ticks = runtime.timer(Duration::from_millis(200), move || {
+    let ticks = runtime.resting_timer(Duration::from_millis(200), move || {
         // A full inbox checks its queue anyway.
         let _ = ticks.send(Event::Tick, 0);
     });
@@ -230,6 +231,7 @@ struct InsTopics {
 
 /// State of the compute thread.
 struct ComputeState {
+    activity: Activity,
     machine: EnuTransformer,
     outputs: Outputs,
     clock: Clock,
@@ -267,6 +269,9 @@ impl ComputeState {
             Event::PoseWithCovariance(m) => ins(&topics.ins, InsMessage::PoseWithCovariance(&m)),
             Event::Tick => {
                 let outputs = machine.tick(now_ns);
+                if machine.is_waiting() {
+                    self.activity.note();
+                }
                 self.diagnose();
                 outputs
             }

@@ -107,7 +107,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     }
     losses.watch(&inputs);
     let looks = inbox.clone();
-    let looks = runtime.timer(Duration::from_millis(500), move || {
+    let looks = runtime.resting_timer(Duration::from_millis(500), move || {
         let _ = looks.send(Event::Tick, 0);
     });
     let set_network = network.as_ref().map(Worker::settings);

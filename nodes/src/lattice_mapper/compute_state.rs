@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 use lattice_msgs::geographic_msgs::GeoPointStamped;
 use lattice_runtime::logging::Throttle;
-use lattice_runtime::{Diagnostics, Losses};
+use lattice_runtime::{Activity, Diagnostics, Losses};
 
 use super::autosave::Autosave;
 use super::corrected::CorrectedDrive;
@@ -29,6 +29,7 @@ pub(super) struct UpdateRequests {
 
 /// State of the compute thread.
 pub(super) struct ComputeState {
+    pub activity: Activity,
     pub machine: LatticeMapper,
     /// Present if corrections are followed.
     pub drive: Option<CorrectedDrive>,

@@ -67,6 +67,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let max_kept_bytes = settings.max_kept_bytes;
     let drive = max_kept_bytes.map(|max_bytes| CorrectedDrive::new(&machine, max_bytes));
     let mut compute_state = ComputeState {
+        activity: node.activity(),
         drive,
         machine,
         autosave,
@@ -164,7 +165,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let calls = services::serve(&node, &inbox, Event::Call, maps, Arc::clone(&max_voxels))?;
     let timer = |period, event: fn() -> Event| {
         let inbox = inbox.clone();
-        runtime.timer(period, move || notify(&inbox, event()))
+        runtime.resting_timer(period, move || notify(&inbox, event()))
     };
     let updates = timer(settings.update_period, || Event::Update);
     let centers = timer(settings.centers_period, || Event::Centers);
@@ -271,6 +272,9 @@ impl ComputeState {
             true => drive.finish(&mut self.machine, epoch),
             false => drive.step(&mut self.machine, epoch),
         };
+        if drive.is_at_work() {
+            self.activity.note();
+        }
         match corrected {
             Ok(true) => self.output.replaced(),
             Ok(false) => {}

@@ -94,7 +94,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         subscriptions.push(losses.subscribe_to(&node, topics, &inbox, map, update)?);
     }
     let publishes = inbox.clone();
-    let period = runtime.timer(settings.period, move || {
+    let period = runtime.resting_timer(settings.period, move || {
         let _ = publishes.send(Event::Publish, 0);
     });
     open_params(params, move |params| {

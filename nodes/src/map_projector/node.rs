@@ -19,7 +19,7 @@ use crate::report;
 use crate::start::{Finish, LAST_EVENTS, LAST_FLUSH, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{ActionLimits, Diagnostics, Runtime};
+use lattice_runtime::{ActionLimits, Activity, Diagnostics, Runtime};
 
 /// Time without a subscriber after which the map is no longer followed.
 const IDLE: Duration = Duration::from_secs(10);
@@ -40,6 +40,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         false => None,
     };
     let mut state = ComputeState {
+        activity: node.activity(),
         requests,
         planner,
         draws: false,
@@ -96,7 +97,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         false => None,
     };
     let (projects, goals) = (inbox.clone(), action.clone());
-    let period = runtime.timer(settings.update_period, move || {
+    let period = runtime.resting_timer(settings.update_period, move || {
         if let Some(goals) = &goals {
             goals.expire();
         }
@@ -117,6 +118,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 
 /// State of the compute thread.
 struct ComputeState {
+    activity: Activity,
     requests: MapRequests,
     machine: MapProjector,
     robot: RobotPosition,
@@ -265,6 +267,9 @@ impl ComputeState {
         }
         if self.grid_due.is_some_and(|due| due <= Instant::now()) {
             self.publish_whole();
+        }
+        if self.grid_due.is_some() {
+            self.activity.note();
         }
     }
 

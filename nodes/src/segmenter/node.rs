@@ -67,7 +67,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let images = inside::subscribe(&node, "rgb/image_rect_color", settings.compressed, on_image)?;
     losses.watch(std::slice::from_ref(&images));
     let looks = inbox.clone();
-    let looks = runtime.timer(Duration::from_millis(500), move || {
+    let looks = runtime.resting_timer(Duration::from_millis(500), move || {
         let _ = looks.send(Event::Diagnose, 0);
     });
     open_params(params, move |params| {

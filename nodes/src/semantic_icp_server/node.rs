@@ -27,8 +27,8 @@ use lattice_runtime::SubscriptionExecutor::{Dedicated, Shared};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{
-    ActionLimits, Clock, Diagnostics, Feedback, GoalHandle, Losses, Reply, Runtime, TfGuard,
-    Undecoded, lock,
+    ActionLimits, Activity, Clock, Diagnostics, Feedback, GoalHandle, Losses, Reply, Runtime,
+    TfGuard, Undecoded, lock,
 };
 
 /// Period of the diagnostic status.
@@ -72,6 +72,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let hurry = Hurry::default();
     let guard = TfGuard::new(|_, _| "another headset_frame".to_owned());
     let mut compute_state = ComputeState {
+        activity: node.activity(),
         losses: losses.clone(),
         machine: SemanticIcpServer::new(server).hurried_by(&hurry),
         search: None,
@@ -151,7 +152,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     )?);
     let goals = Arc::clone(&action);
     let ticks = inbox.clone();
-    let tf_period = runtime.timer(tf_period, move || notify(&ticks, Event::Tick));
+    let tf_period = runtime.resting_timer(tf_period, move || notify(&ticks, Event::Tick));
     let diagnoses = inbox.clone();
     let seconds = runtime.timer(DIAGNOSE, move || {
         goals.expire();
@@ -196,6 +197,7 @@ enum Client {
 
 /// State of the compute thread.
 struct ComputeState {
+    activity: Activity,
     machine: SemanticIcpServer,
     search: Option<SearchPort>,
     outputs: Outputs,
@@ -257,7 +259,13 @@ impl ComputeState {
                 self.machine.calibrate(call, &goal, now_ns)
             }
             Event::Look => Vec::new(),
-            Event::Tick => self.machine.tick(now_ns).into_iter().collect(),
+            Event::Tick => {
+                let repeated = self.machine.tick(now_ns);
+                if repeated.is_some() {
+                    self.activity.note();
+                }
+                repeated.into_iter().collect()
+            }
             Event::Diagnose => {
                 self.diagnose();
                 let overdue = self.machine.check_keyframe_timeout();

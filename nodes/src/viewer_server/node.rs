@@ -63,7 +63,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         reach,
         report_file,
     } = Settings::from_params(params)?;
-    let broadcaster = Arc::new(Broadcaster::new(viewer.max_clients));
+    let broadcaster = Arc::new(Broadcaster::new(viewer.max_clients, node.activity()));
     broadcaster.map_channels(
         &node.resolve("voxel_map")?,
         &node.resolve("voxel_map_updates")?,
@@ -118,7 +118,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         on_fixed,
     )?;
     let period = |viewer: &ViewerOptions| Duration::from_secs_f64(viewer.update_period_s);
-    let ticks = runtime.timer(period(&viewer), move || {
+    let ticks = runtime.resting_timer(period(&viewer), move || {
         let _ = inbox.send(Event::Tick, 0);
     });
     open_params(params, move |params| {
@@ -226,6 +226,9 @@ impl ComputeState {
 
     fn tick(&mut self) {
         self.input.make_good();
+        if self.broadcaster.clients() > 0 {
+            self.node.activity().note();
+        }
         let second = self.seconds.check().is_some();
         if second && self.source.check_keyframe_timeout() {
             self.input.ask_for_keyframe();

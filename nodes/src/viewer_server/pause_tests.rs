@@ -11,6 +11,7 @@ use lattice_core::lattice::{Lattice, LatticeKind};
 use lattice_msgs::cdr;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::std_msgs::Header;
+use lattice_runtime::Activity;
 use nalgebra::Vector3;
 use serde_json::json;
 
@@ -33,7 +34,7 @@ impl Growing {
     fn new() -> Self {
         let lattice = Lattice::new(LatticeKind::Cubic, 0.001).unwrap();
         let mut mapper = LatticeMapper::new(MapperOptions::new(lattice), 7).unwrap();
-        let broadcaster = Arc::new(Broadcaster::new(4));
+        let broadcaster = Arc::new(Broadcaster::new(4, Activity::default()));
         broadcaster.channel::<LatticeMap>("/voxel_map", Class::Map, false);
         broadcaster.channel::<LatticeMapUpdate>("/voxel_map_updates", Class::Updates, false);
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));

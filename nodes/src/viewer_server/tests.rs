@@ -12,6 +12,7 @@ use lattice_msgs::cdr;
 use lattice_msgs::lattice::LatticeMap;
 use lattice_msgs::std_msgs::Empty;
 use lattice_msgs::tf2_msgs::TFMessage;
+use lattice_runtime::Activity;
 use proptest::prelude::*;
 
 use super::broadcast::entry;
@@ -88,7 +89,7 @@ proptest! {
 }
 
 pub(super) fn server(max_clients: usize, auth: RequestAuth) -> (Server, Arc<Broadcaster>) {
-    let broadcaster = Arc::new(Broadcaster::new(max_clients));
+    let broadcaster = Arc::new(Broadcaster::new(max_clients, Activity::default()));
     broadcaster.channel::<LatticeMap>("/voxel_map", Class::Map, false);
     broadcaster.channel::<TFMessage>("/tf", Class::Newest { depth: 2 }, false);
     broadcaster.channel::<TFMessage>("/tf_static", Class::Newest { depth: 1 }, true);
@@ -270,7 +271,7 @@ fn newest_messages_give_way_and_control_is_bounded() {
 
 #[test]
 fn messages_to_clients_are_counted_and_those_that_give_way_too() {
-    let broadcaster = Broadcaster::new(2);
+    let broadcaster = Broadcaster::new(2, Activity::default());
     let channel = broadcaster.channel::<Empty>("/newest", Class::Newest { depth: 2 }, false);
     let (id, _woken) = broadcaster.enter().unwrap();
     broadcaster.subscribe(id, 1, channel);
@@ -288,7 +289,7 @@ fn messages_to_clients_are_counted_and_those_that_give_way_too() {
 
 #[test]
 fn a_client_that_is_often_refused_silences_no_other() {
-    let broadcaster = Broadcaster::new(2);
+    let broadcaster = Broadcaster::new(2, Activity::default());
     let [(noisy, _noisy), (other, _other)] = [(); 2].map(|()| broadcaster.enter().unwrap());
     let told = |id: u64| {
         let waiting = std::iter::from_fn(|| broadcaster.next(id));

@@ -15,7 +15,7 @@ use crate::report;
 use crate::start::{Finish, LAST_EVENTS, LAST_FLUSH, NodeError, handed_over, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
-use lattice_runtime::{Diagnostics, Level, Publisher, Runtime, Undecoded};
+use lattice_runtime::{Activity, Diagnostics, Level, Publisher, Runtime, Undecoded};
 
 /// Acknowledgement delay that triggers a warning: two heartbeats of Fast DDS, the
 /// slowest to repair.
@@ -39,6 +39,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let publisher = node.lossless_publisher("voxel_markers", Qos::MARKERS)?;
     let (losses, hurry) = (MapLosses::default(), Hurry::default());
     let mut compute_state = ComputeState {
+        activity: node.activity(),
         input: MapRequests::new(&node, &settings.mapper, &losses)?,
         machine: VoxelMarkers::new(settings.markers).hurried_by(&hurry),
         markers: publisher.clone(),
@@ -61,7 +62,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         let _ = joined.send(Event::Redraw, 0);
     });
     let draws = inbox.clone();
-    let period = runtime.timer(settings.period, move || {
+    let period = runtime.resting_timer(settings.period, move || {
         let _ = draws.send(Event::Draw, 0);
     });
     open_params(params, move |params| {
@@ -80,6 +81,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
 
 /// State of the compute thread.
 struct ComputeState {
+    activity: Activity,
     input: MapRequests,
     machine: VoxelMarkers,
     markers: Publisher<MarkerArray>,
@@ -129,6 +131,7 @@ impl ComputeState {
         self.machine.wake();
         if !self.markers.is_acknowledged() {
             self.waits_since.get_or_insert_with(Instant::now);
+            self.activity.note();
             return;
         }
         self.waits_since = None;
@@ -139,6 +142,9 @@ impl ComputeState {
             if let Err(error) = self.markers.publish(Arc::new(array)) {
                 log::debug!("markers not published: {error}");
             }
+        }
+        if self.machine.is_dirty() {
+            self.activity.note();
         }
     }
 

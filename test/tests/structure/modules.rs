@@ -94,7 +94,7 @@ const LAYERS: [(&str, &str); 26] = [
     ),
     (
         "nodes/runtime/src",
-        "sync shutdown task_thread config logging error transport graph communication node",
+        "sync activity shutdown task_thread config logging error transport graph communication node",
     ),
     (
         "nodes/runtime/src/config",

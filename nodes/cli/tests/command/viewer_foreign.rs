@@ -18,7 +18,7 @@ use lattice_nodes::viewer_server::{Broadcaster, Class, Entry, RequestAuth, Serve
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
-use lattice_runtime::{LoopbackDomain, Runtime, SubscriptionExecutor};
+use lattice_runtime::{Activity, LoopbackDomain, Runtime, SubscriptionExecutor};
 use serde_bytes::ByteBuf;
 use serde_json::{Map, Value, to_value};
 
@@ -87,7 +87,7 @@ fn known_map() -> LatticeMap {
 
 /// A server with one message on each channel, and these messages by their topics.
 fn server() -> (Server, Value) {
-    let broadcaster = Arc::new(Broadcaster::new(4));
+    let broadcaster = Arc::new(Broadcaster::new(4, Activity::default()));
     let mut all = Map::new();
     let map = known_map();
     broadcaster.channel::<LatticeMap>("/voxel_map", Class::Map, false);

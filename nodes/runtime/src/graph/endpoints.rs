@@ -10,6 +10,7 @@ use futures::stream::BoxStream;
 use super::discovered_graph::DiscoveredGraph;
 use super::output_types::OutputTypes;
 use super::type_versions::TypeVersions;
+use crate::activity::Activity;
 use crate::sync::lock;
 use crate::transport::peers::Peers;
 use crate::transport::port::{EndpointId, PortEvent};
@@ -29,6 +30,7 @@ pub(crate) struct Endpoints {
     outputs: OutputTypes,
     versions: TypeVersions,
     inner: Mutex<Inner>,
+    activity: Activity,
 }
 
 #[derive(Default)]
@@ -44,6 +46,14 @@ struct Change {
 }
 
 impl Endpoints {
+    /// None yet; each event of discovery is noted.
+    pub(crate) fn new(activity: Activity) -> Self {
+        Self {
+            activity,
+            ..Self::default()
+        }
+    }
+
     /// Passes all past and future events of the endpoint to `peers`.
     pub(crate) fn register(&self, endpoint: EndpointId, peers: &Arc<Peers>) {
         let mut inner = lock(&self.inner);
@@ -68,6 +78,7 @@ impl Endpoints {
     pub(crate) async fn watch(self: Arc<Self>, mut events: BoxStream<'static, PortEvent>) {
         while let Some(event) = events.next().await {
             self.hear(event);
+            self.activity.note();
         }
     }
 

@@ -8,6 +8,7 @@ use super::clock::Clock;
 use super::diagnostics::Diagnostics;
 use super::expected::{Expected, Source, Watch};
 use super::shared::{DEFAULT_MAX_MESSAGE_BYTES, Shared};
+use crate::activity::Activity;
 use crate::communication::lifecycle_gate::LifecycleGate;
 use crate::communication::publisher::{Publisher, RawPublisher};
 use crate::communication::subscription::{
@@ -252,6 +253,11 @@ impl Node {
         self.inner
             .shared
             .subscribe_raw(self.id(), of, &qos, executor, max, handler)
+    }
+
+    /// Activity of the process, see [`Runtime::resting_timer`](crate::Runtime::resting_timer).
+    pub fn activity(&self) -> Activity {
+        self.inner.shared.activity.clone()
     }
 
     /// Known publishers of other processes, on any topic.

@@ -114,6 +114,22 @@ impl Runtime {
         Timer::start(&self.shared.io, period, callback)
     }
 
+    /// Timer as [`Runtime::timer`] that rests while nothing happens: after a period without a received message or
+    /// request, a change of the graph, or [`Activity::note`](crate::Activity::note), the callback is called once a second, or in its own
+    /// period if that is longer. Whatever happens ends the rest at once.
+    pub fn resting_timer(
+        &self,
+        period: Duration,
+        callback: impl FnMut() + Send + 'static,
+    ) -> Timer {
+        Timer::start_resting(
+            &self.shared.io,
+            period,
+            self.shared.activity.clone(),
+            callback,
+        )
+    }
+
     /// Handle to request shutdown.
     pub fn shutdown_handle(&self) -> Shutdown {
         self.shared.shutdown.clone()

@@ -294,6 +294,11 @@ impl CorrectedDrive {
         self.work(machine, epoch, Instant::now().checked_add(STEP))
     }
 
+    /// True while a corrected map is being made.
+    pub fn is_at_work(&self) -> bool {
+        self.renewal.is_some()
+    }
+
     /// Completes the map with the newest corrections, however little they move.
     pub fn finish(
         &mut self,

@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use lattice_msgs::RosMessage;
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
-use lattice_runtime::lock;
+use lattice_runtime::{Activity, lock};
 use smol::channel::{Receiver, bounded};
 
 use super::bridge::Bridge;
@@ -29,6 +29,8 @@ pub struct Broadcaster {
     bridge: OnceLock<Box<dyn Bridge>>,
     /// Offer without a bridge.
     nothing: Offer,
+    /// Noted when a client connects.
+    activity: Activity,
     inner: Mutex<Inner>,
 }
 
@@ -62,21 +64,22 @@ pub struct Demand {
 }
 
 impl Broadcaster {
-    /// Creates a broadcaster without channels, for up to `max_clients`.
-    pub fn new(max_clients: usize) -> Self {
-        Self::of("live", max_clients)
+    /// Creates a broadcaster without channels, for up to `max_clients`, each of which is noted as activity.
+    pub fn new(max_clients: usize, activity: Activity) -> Self {
+        Self::of("live", max_clients, activity)
     }
 
     /// Creates a broadcaster for the constant map of a file.
     pub fn of_file(max_clients: usize) -> Self {
-        Self::of("file", max_clients)
+        Self::of("file", max_clients, Activity::default())
     }
 
-    fn of(source: &'static str, max_clients: usize) -> Self {
+    fn of(source: &'static str, max_clients: usize, activity: Activity) -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH);
         Self {
             max_clients,
             source,
+            activity,
             session: since.map_or(0, |since| since.as_nanos()).to_string(),
             bridge: OnceLock::new(),
             nothing: Offer::default(),
@@ -237,6 +240,8 @@ impl Broadcaster {
         inner.next_client += 1;
         inner.counts.clients_in += 1;
         inner.clients.insert(id, Client::new(outbox, wake));
+        drop(inner);
+        self.activity.note();
         Some((id, woken))
     }
 

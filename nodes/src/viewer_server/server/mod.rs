@@ -60,7 +60,7 @@ impl Server {
                     // Ends when the sender closes.
                     let _ = stopped.recv().await;
                 };
-                smol::block_on(executor.run(smol::future::or(accept, ended)));
+                smol::future::block_on(executor.run(smol::future::or(accept, ended)));
             })?;
         Ok(Self {
             broadcaster: served,

@@ -18,6 +18,7 @@ use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
 use lattice_nodes::convert::geometry;
 use lattice_nodes::viewer_server::{Broadcaster, Class, Entry, RequestAuth, Server};
+use lattice_runtime::Activity;
 use nalgebra::Isometry3;
 use serde::Serialize;
 use serde_bytes::ByteBuf;
@@ -78,7 +79,7 @@ impl Stage {
     }
 
     fn with(cells: &[Known], live: bool) -> Self {
-        let broadcaster = Arc::new(Broadcaster::new(4));
+        let broadcaster = Arc::new(Broadcaster::new(4, Activity::default()));
         broadcaster.channel::<LatticeMap>("/voxel_map", Class::Map, false);
         let one = Class::Newest { depth: 1 };
         let calibration = broadcaster.channel::<CalibrationResult>("/calibration", one, true);

@@ -18,6 +18,7 @@ use lattice_msgs::rosgraph_msgs;
 
 pub use self::calling::{CallError, Client};
 use self::receive_buffer::ReceiveBuffer;
+use crate::activity::Activity;
 use crate::communication::publisher::PublisherParts;
 use crate::communication::service::{Answers, LocalServices, Server, Unanswered};
 use crate::communication::subscription::{Intake, Sample, Stats, SubscriptionExecutor};
@@ -59,13 +60,15 @@ impl Shared {
         let io = TaskThread::start("io", shutdown.clone())?;
         let publishing = TaskThread::start("publisher", shutdown.clone())?;
         let transport = join(network, enclave)?;
-        let endpoints = Arc::new(Endpoints::default());
+        let activity = Activity::default();
+        let endpoints = Arc::new(Endpoints::new(activity.clone()));
         let graph = Graph::new();
         let watch = Arc::clone(&endpoints).watch(transport.events());
         let watch = io.spawn(watch);
         let shared = Arc::new(Self {
             bus: LocalBus::default(),
             shutdown,
+            activity,
             io,
             tasks: Arc::default(),
             receive_buffer: ReceiveBuffer::probe(network.transport),

@@ -93,6 +93,8 @@ impl Shared {
                 parts.peer_joined();
             }
         }));
+        let activity = self.activity.clone();
+        peers.on_joined(Box::new(move || activity.note()));
         self.endpoints.register(id, &peers);
         self.endpoints.watch_type(&peers, ros_type);
         Ok(parts)

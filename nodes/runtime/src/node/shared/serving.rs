@@ -36,7 +36,7 @@ impl Shared {
         node: NodeId,
         name: &str,
         max_pending: usize,
-        handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
+        mut handler: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<Server, RuntimeError> {
         let clients = Arc::new(Peers::new(name, "client", log::Level::Debug));
         let readers = Arc::new(Peers::new(name, "reply reader", log::Level::Debug));
@@ -85,6 +85,11 @@ impl Shared {
             ending,
             max_pending: max_pending.max(1),
             warning: Throttle::new(WARNING_PERIOD),
+        };
+        let activity = self.activity.clone();
+        let handler = move |request, reply| {
+            handler(request, reply);
+            activity.note();
         };
         let task = self
             .io

@@ -9,6 +9,7 @@ use smol::Task;
 use smol::channel::Sender;
 
 use super::receive_buffer::ReceiveBuffer;
+use crate::activity::Activity;
 use crate::communication::publisher::PublisherParts;
 use crate::communication::service::{Answers, LocalServices, Server, Unanswered};
 use crate::communication::subscription::{Intake, Stats, Subscription};
@@ -26,6 +27,7 @@ use crate::transport::port::Transport;
 pub(crate) struct Shared {
     pub bus: LocalBus,
     pub shutdown: Shutdown,
+    pub activity: Activity,
     pub io: TaskThread,
     pub tasks: Arc<Tasks>,
     pub receive_buffer: ReceiveBuffer,

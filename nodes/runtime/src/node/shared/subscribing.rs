@@ -131,7 +131,14 @@ impl Shared {
             _sender: sender,
             stats: Arc::clone(&stats),
         };
-        let task = source.run(move |sample: Sample<'_, M>| handler(sample, &stats));
+        let activity = self.activity.clone();
+        peers.on_joined(Box::new(move || activity.note()));
+        let activity = self.activity.clone();
+        let task = source.run(move |sample: Sample<'_, M>| {
+            handler(sample, &stats);
+            // After the handler: a timer finds the message handed over.
+            activity.note();
+        });
         let running = match executor {
             SubscriptionExecutor::Shared => Running::OnIoThread {
                 _task: self.io.spawn(task).ok_or_else(|| closed(topic))?,
