@@ -109,20 +109,19 @@ impl Rest {
     }
 }
 
-/// First multiple of `period`, counted from the first call in this process, that is not before `at`.
+/// Start of the first timer of the process, from which rest periods are counted.
+static ORIGIN: LazyLock<Instant> = LazyLock::new(Instant::now);
+
+/// First multiple of `period` since [`ORIGIN`] that is not before `at`.
 fn next_multiple(period: Duration, at: Instant) -> Instant {
-    static ORIGIN: LazyLock<Instant> = LazyLock::new(Instant::now);
-    let since = at.saturating_duration_since(*ORIGIN).as_nanos();
-    let late = since % period.as_nanos().max(1);
-    let wait = if late == 0 {
-        0
-    } else {
-        period.as_nanos() - late
-    };
-    u64::try_from(wait)
-        .ok()
-        .and_then(|wait| at.checked_add(Duration::from_nanos(wait)))
-        .unwrap_or(at)
+    let (since, period) = (
+        at.saturating_duration_since(*ORIGIN).as_nanos(),
+        period.as_nanos(),
+    );
+    let wait = since.checked_next_multiple_of(period);
+    let wait = wait.and_then(|multiple| u64::try_from(multiple - since).ok());
+    let next = wait.and_then(|wait| at.checked_add(Duration::from_nanos(wait)));
+    next.unwrap_or(at)
 }
 
 async fn tick(
@@ -135,6 +134,7 @@ async fn tick(
         true => None,
         false => at.checked_add(period.max(MIN_PERIOD)),
     };
+    LazyLock::force(&ORIGIN);
     let mut due = next(Instant::now(), period);
     // Activity at the last callback.
     let mut seen = None;
