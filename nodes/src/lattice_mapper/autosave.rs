@@ -1,6 +1,5 @@
-//! Automatic saves of a changing map, and resuming from the saved file.
+//! Automatic saves of a changing map.
 
-use std::io::ErrorKind;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -9,27 +8,24 @@ use lattice_runtime::params::{ParamError, Params};
 
 use super::map_folder::{MapFolder, Refusal};
 use super::state::LatticeMapper;
-use crate::start::NodeError;
 
 /// Longest settable period between saves.
 const MAX_PERIOD_S: f64 = 86_400.0;
 
-/// File and period of automatic saves, and whether the node resumes from the file.
+/// File and period of automatic saves.
 pub(super) struct AutosaveOptions {
-    file: String,
+    pub file: String,
     /// Zero: never.
     pub period: Duration,
-    resume: bool,
 }
 
 impl AutosaveOptions {
-    /// Reads the parameters `autosave_period_s`, `autosave_file` and `resume`.
+    /// Reads the parameters `autosave_period_s` and `autosave_file`.
     pub(super) fn from_params(params: &Params) -> Result<Self, ParamError> {
         let period_s = params.f64_in("autosave_period_s", 0.0, 0.0..=MAX_PERIOD_S)?;
         Ok(Self {
             file: params.string("autosave_file", "autosave.lattice")?,
             period: Duration::from_secs_f64(period_s),
-            resume: params.bool("resume", false)?,
         })
     }
 }
@@ -52,18 +48,14 @@ pub(super) struct Autosave {
 }
 
 impl Autosave {
-    /// Creates the saves; with `resume` the machine loads the map of an existing file.
-    pub(super) fn start(
+    /// Creates the saves of a map, the present state of which is not saved.
+    pub(super) fn new(
         options: AutosaveOptions,
         maps: &MapFolder,
-        machine: &mut LatticeMapper,
-        max_voxels: usize,
+        machine: &LatticeMapper,
         shutdown: Shutdown,
-    ) -> Result<Self, NodeError> {
-        if options.resume {
-            resume(maps, &options.file, machine, max_voxels)?;
-        }
-        Ok(Self {
+    ) -> Self {
+        Self {
             maps: maps.clone(),
             file: options.file,
             period: options.period,
@@ -71,7 +63,7 @@ impl Autosave {
             writing: None,
             failed: None,
             shutdown,
-        })
+        }
     }
 
     /// Starts saving a changed map, unless a save is in progress.
@@ -142,28 +134,6 @@ impl Autosave {
     }
 }
 
-fn resume(
-    maps: &MapFolder,
-    file: &str,
-    machine: &mut LatticeMapper,
-    max_voxels: usize,
-) -> Result<(), NodeError> {
-    let contents = match maps.read(file, max_voxels) {
-        Ok(contents) => contents,
-        Err(Refusal::Io(_, error)) if error.kind() == ErrorKind::NotFound => {
-            log::info!("{file:?} does not exist, so nothing is resumed: the map begins empty");
-            return Ok(());
-        }
-        Err(refusal) => return Err(format!("cannot resume: {refusal}").into()),
-    };
-    // The epoch has not been published yet.
-    let (epoch, _) = machine.state();
-    let voxels = machine.load(contents, epoch);
-    let voxels = voxels.map_err(|refusal| format!("cannot resume from {file:?}: {refusal}"))?;
-    log::info!("resumed with {voxels} voxels of {file:?}");
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use std::fs;
@@ -176,6 +146,8 @@ mod tests {
 
     use super::*;
     use crate::lattice_mapper::MapperOptions;
+    use crate::lattice_mapper::initial_map::InitialMap;
+    use crate::start::NodeError;
 
     fn machine(kind: LatticeKind) -> LatticeMapper {
         let lattice = Lattice::new(kind, 0.125).unwrap();
@@ -205,13 +177,9 @@ mod tests {
         let params = Params::load(&args, "/lattice_mapper").unwrap();
         let maps = MapFolder::new(&folder.display().to_string()).unwrap();
         let mut machine = machine(kind);
-        let autosave = Autosave::start(
-            AutosaveOptions::from_params(&params)?,
-            &maps,
-            &mut machine,
-            1000,
-            Shutdown::default(),
-        )?;
+        let options = AutosaveOptions::from_params(&params)?;
+        InitialMap::from_params(&params, &options.file)?.load(&maps, &mut machine, 1000)?;
+        let autosave = Autosave::new(options, &maps, &machine, Shutdown::default());
         Ok((machine, autosave))
     }
 

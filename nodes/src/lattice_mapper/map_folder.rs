@@ -14,6 +14,7 @@ use rustix::fs::{Mode, OFlags, open};
 use thiserror::Error;
 
 use crate::files::atomic_write::AtomicFile;
+use crate::files::points::{PointFile, PointFileError, PointFileOptions, read_points};
 
 /// Fast compression level.
 const ZSTD_LEVEL: i32 = 3;
@@ -35,6 +36,8 @@ pub(super) enum Refusal {
     Io(String, io::Error),
     #[error("{0:?}: {1}")]
     Format(String, FileError),
+    #[error("{0:?}: {1}")]
+    Points(String, PointFileError),
 }
 
 /// The folder, and the label names written into its maps; clones share them.
@@ -82,6 +85,14 @@ impl MapFolder {
             names.entry(label).or_insert(name);
         }
         Ok(contents)
+    }
+
+    /// Reads a point file, such as an octree.
+    pub(super) fn read_points(&self, name: &str) -> Result<PointFile, Refusal> {
+        let path = self.place(name)?;
+        regular_file(name, &path)?;
+        let read = read_points(&path, &PointFileOptions::default());
+        read.map_err(|error| Refusal::Points(name.to_owned(), error))
     }
 
     /// Sets label names for the maps written from now on.

@@ -10,6 +10,7 @@ mod counts;
 mod datum;
 mod free_options;
 mod free_space;
+mod initial_map;
 mod machine;
 mod map_folder;
 mod map_messages;

@@ -56,13 +56,13 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let hurry = Hurry::default();
     let mut machine = LatticeMapper::new(settings.mapper, epoch())?.hurried_by(&hurry);
     let (output, requests) = MapOutput::open(&node, &hurry)?;
-    let autosave = Autosave::start(
+    (settings.initial_map).load(&maps, &mut machine, old.voxel_limit())?;
+    let autosave = Autosave::new(
         settings.autosave,
         &maps,
-        &mut machine,
-        old.voxel_limit(),
+        &machine,
         runtime.shutdown_handle(),
-    )?;
+    );
     let autosave_period = autosave.period;
     let max_kept_bytes = settings.max_kept_bytes;
     let drive = max_kept_bytes.map(|max_bytes| CorrectedDrive::new(&machine, max_bytes));

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::autosave::AutosaveOptions;
 use super::free_options::FreeSpaceMethod;
+use super::initial_map::InitialMap;
 use super::map_folder::MapFolder;
 use super::options::MapperOptions;
 use crate::compute::ComputeLimits;
@@ -49,6 +50,7 @@ const ABOUT: &[About] = about! {
     "autosave_file" fixed("it names an output"): "File of these saves, below map_dir.";
     "octomap_services" fixed("services are made with it"): "Whether ~/reset and ~/clear_bbox have the types of octomap_server (std_srvs/Empty, octomap_msgs/BoundingBoxQuery), and octomap_binary and octomap_full are topics and services. With free_space: evidence and free_level 0 all cells that rays pass keep their log-odds then.";
     "resume" fixed("it is done at the start"): "Whether the map is loaded from that file at the start, if it exists, instead of starting empty.";
+    "map_file" fixed("it is read at the start"): "Map at the start, below map_dir: a map file of the same cells, or a point file (.bt, .ot, .ply, .pcd, .las, .xyz) in map_frame. It is not written. With resume, a saved map is used instead. Empty: none.";
 };
 
 const MAP: &str = "the map is made with it";
@@ -59,6 +61,7 @@ pub(super) struct Settings {
     pub limits: ComputeLimits,
     pub maps: MapFolder,
     pub autosave: AutosaveOptions,
+    pub initial_map: InitialMap,
     pub update_period: Duration,
     pub centers_period: Duration,
     /// Zero without free space to publish.
@@ -83,10 +86,12 @@ impl Settings {
             return Err(params.invalid("follow_corrections", problem));
         }
         let has_free = mapper.free_space.free_level > 0;
+        let autosave = AutosaveOptions::from_params(params)?;
         Ok(Self {
             limits: options::compute_limits(params, 4096, 256 << 20, options::threads(params, 0)?)?,
             maps: MapFolder::from_params(params)?,
-            autosave: AutosaveOptions::from_params(params)?,
+            initial_map: InitialMap::from_params(params, &autosave.file)?,
+            autosave,
             update_period: options::period(params, "update_period_s", 0.2)?,
             centers_period: options::period(params, "centers_period_s", 1.0)?,
             free_period: if has_free {

@@ -50,7 +50,7 @@ const LAYERS: [(&str, &str); 26] = [
     (
         "nodes/src/lattice_mapper",
         "counts free_options options free_space occupancy map_folder outputs refusal state datum machine map_messages octree operations corrected report \
-         plan call octomap services autosave parameters unmapped compute_state status node",
+         plan call octomap services initial_map autosave parameters unmapped compute_state status node",
     ),
     (
         "nodes/src/lidar_odometry",

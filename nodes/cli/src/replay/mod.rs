@@ -224,6 +224,12 @@ impl Replay {
     fn maps(&self) -> CliResult<Vec<MapperOptions>> {
         let params = self.params_of("lattice_mapper")?;
         let given = MapperOptions::from_params(&params)?;
+        if params.bool("resume", false)? || !params.string("map_file", "")?.is_empty() {
+            eprintln!(
+                "resume and map_file of lattice_mapper are not used: the map of a replay in one process begins empty; \
+                 `lattice map merge` joins two maps"
+            );
+        }
         let orientation = match self.orientation {
             Some(orientation) => orientation,
             None => MapperOptions::orientation_from(&params)?,
