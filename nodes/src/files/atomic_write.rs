@@ -60,6 +60,13 @@ impl AtomicFile {
         })
     }
 
+    /// Restricts the file to its owner, before anything is written.
+    pub fn private(self) -> io::Result<Self> {
+        let owner = fs::Permissions::from_mode(0o600);
+        self.out.get_ref().set_permissions(owner)?;
+        Ok(self)
+    }
+
     /// Syncs the data to disk, then replaces the path.
     pub fn finish(self) -> io::Result<()> {
         let file = self.out.into_inner().map_err(|error| error.into_error())?;
