@@ -10,6 +10,9 @@ use crate::viewer_server::protocol::SUBPROTOCOLS;
 
 /// Cookie with the token after it was given in a URL.
 const COOKIE: &str = "lattice_token";
+/// The same over TLS. Under one name browsers would keep it, and refuse that of a later server without TLS on this host; the prefix makes
+/// them take it from HTTPS only.
+const SECURE_COOKIE: &str = "__Host-lattice_token";
 
 /// Content security policy: the page loads its own files only.
 const POLICY: &str = "default-src 'none'; script-src 'self'; worker-src 'self'; style-src 'self'; \
@@ -69,14 +72,14 @@ impl RequestAuth {
             return refuse("403 Forbidden", why);
         }
         if let Some(token) = &self.token {
-            let given = head.query("token").or_else(|| head.cookie(COOKIE));
+            let given = head.query("token").or_else(|| head.cookie(self.cookie()));
             if !given.is_some_and(|given| same(given, token)) {
                 let why =
                     b"The token is missing or wrong: open the address that the node printed.\n";
                 return refuse("401 Unauthorized", why);
             }
             if head.query("token").is_some() && !head.upgrade {
-                return keep_token(token, self.secure);
+                return self.keep_token(token);
             }
         }
         match (head.upgrade, files::find(&head.path)) {
@@ -89,6 +92,30 @@ impl RequestAuth {
             }),
             (false, None) => refuse("404 Not Found", b"There is no such page.\n"),
         }
+    }
+
+    fn cookie(&self) -> &'static str {
+        match self.secure {
+            true => SECURE_COOKIE,
+            false => COOKIE,
+        }
+    }
+
+    /// Stores the token in a cookie, and removes it from the URL.
+    fn keep_token(&self, token: &str) -> Decision {
+        let only_tls = match self.secure {
+            true => "; Secure",
+            false => "",
+        };
+        let cookie = self.cookie();
+        Decision::Answer(Response {
+            status: "303 See Other",
+            media_type: "text/plain; charset=utf-8",
+            headers: format!(
+                "Location: /\r\nSet-Cookie: {cookie}={token}{only_tls}; HttpOnly; SameSite=Strict; Path=/\r\n"
+            ),
+            body: b"",
+        })
     }
 
     /// Decides on a request without TLS to a server with TLS. A token in it was sent unencrypted, and is not repeated.
@@ -141,22 +168,6 @@ fn refuse(status: &'static str, body: &'static [u8]) -> Decision {
         media_type: "text/plain; charset=utf-8",
         headers: String::new(),
         body,
-    })
-}
-
-/// Stores the token in a cookie, and removes it from the URL.
-fn keep_token(token: &str, secure: bool) -> Decision {
-    let only_tls = match secure {
-        true => " Secure;",
-        false => "",
-    };
-    Decision::Answer(Response {
-        status: "303 See Other",
-        media_type: "text/plain; charset=utf-8",
-        headers: format!(
-            "Location: /\r\nSet-Cookie: {COOKIE}={token};{only_tls} HttpOnly; SameSite=Strict; Path=/\r\n"
-        ),
-        body: b"",
     })
 }
 
