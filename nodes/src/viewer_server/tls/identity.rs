@@ -115,8 +115,9 @@ impl Identity {
         let Some(first) = chain.first().cloned() else {
             return Err(not_chain("no such section".to_owned()));
         };
-        let private = PrivateKeyDer::from_pem_slice(&key_pem)
-            .map_err(|error| not_pem("tls_key", key, "PRIVATE KEY", error.to_string()))?;
+        let not_key = |problem| not_pem("tls_key", key, "PRIVATE KEY", problem);
+        let private = PrivateKeyDer::from_pem_slice(&key_pem);
+        let private = private.map_err(|error| not_key(error.to_string()))?;
         let config = config(chain, private).map_err(|error| match error {
             rustls::Error::InconsistentKeys(_) => TlsError::Mismatch {
                 certificate: certificate.to_owned(),
