@@ -74,7 +74,7 @@ const LAYERS: [(&str, &str); 26] = [
     ),
     (
         "nodes/src/segmenter",
-        "checks counts jpeg network colors compressed labels options machine regular_file names file sizes onnx_runtime tract backends parameters worker inside node",
+        "checks counts jpeg network colors compressed labels options machine names file sizes onnx_runtime tract backends parameters worker inside node",
     ),
     (
         "nodes/src/semantic_cloud",

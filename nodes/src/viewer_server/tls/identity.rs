@@ -1,6 +1,5 @@
 //! Certificate and private key of a server, from PEM files.
 
-use std::fs::{self, File};
 use std::io::{self, Read};
 use std::net::IpAddr;
 use std::os::unix::fs::PermissionsExt;
@@ -13,6 +12,8 @@ use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName, UnixTime};
 use rustls::{ServerConfig, crypto, version};
 use webpki::{ALL_VERIFICATION_ALGS, EndEntityCert, KeyUsage};
+
+use crate::files::regular_file;
 
 /// Limit of a PEM file.
 const MAX_PEM_BYTES: u64 = 1 << 20;
@@ -115,7 +116,7 @@ impl Identity {
         let Some(first) = chain.first().cloned() else {
             return Err(not_chain("no such section".to_owned()));
         };
-        let not_key = |problem| not_pem("tls_key", key, "PRIVATE KEY", problem);
+        let not_key = |problem| not_pem("tls_key", key, "PRIVATE KEY without a password", problem);
         let private = PrivateKeyDer::from_pem_slice(&key_pem);
         let private = private.map_err(|error| not_key(error.to_string()))?;
         let config = config(chain, private).map_err(|error| match error {
@@ -189,14 +190,13 @@ pub(super) fn read(path: &Path, parameter: &'static str) -> Result<(Vec<u8>, u32
         path: path.to_owned(),
         error,
     };
-    // Before it is opened: a pipe would block.
-    let found = fs::metadata(path).map_err(unreadable)?;
-    if !found.is_file() || found.len() > MAX_PEM_BYTES {
-        let expected = format!("not a regular file of at most {MAX_PEM_BYTES} bytes");
-        return Err(unreadable(io::Error::other(expected)));
+    let file = regular_file::open(path).map_err(unreadable)?;
+    let found = file.metadata().map_err(unreadable)?;
+    if found.len() > MAX_PEM_BYTES {
+        let problem = format!("{} bytes, at most {MAX_PEM_BYTES} are read", found.len());
+        return Err(unreadable(io::Error::other(problem)));
     }
     let mut bytes = Vec::new();
-    let file = File::open(path).map_err(unreadable)?;
     file.take(MAX_PEM_BYTES)
         .read_to_end(&mut bytes)
         .map_err(unreadable)?;

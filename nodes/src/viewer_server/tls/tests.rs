@@ -5,6 +5,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::time::Duration;
 
 use rcgen::{CertificateParams, KeyPair, date_time_ymd};
+use rustix::fs::{CWD, FileType, mknodat};
 
 use super::*;
 
@@ -36,7 +37,7 @@ fn a_self_made_certificate_is_the_same_after_a_restart() {
     }
     assert!(!first.names([10, 0, 0, 8].into()));
     let pem = fs::read(&file).unwrap();
-    for days in [0, 300, 780] {
+    for days in [0, 300, 630] {
         assert_eq!(kept(&place, ADDRESS, days).fingerprint, first.fingerprint);
     }
     assert_eq!(fs::read(&file).unwrap(), pem);
@@ -44,7 +45,8 @@ fn a_self_made_certificate_is_the_same_after_a_restart() {
     let moved = kept(&place, [10, 0, 0, 8].into(), 0);
     // Back at the address before it needs no other one.
     assert_eq!(kept(&place, ADDRESS, 0).fingerprint, moved.fingerprint);
-    let renewed = kept(&place, [10, 0, 0, 8].into(), 800);
+    let renewed = kept(&place, [10, 0, 0, 8].into(), 650);
+    assert!(renewed.names(ADDRESS));
     let early = kept(&place, [10, 0, 0, 8].into(), 0);
     let all = [&first, &moved, &renewed, &early].map(|identity| &identity.fingerprint);
     for (at, one) in all.iter().enumerate() {
@@ -141,6 +143,15 @@ fn files_of_an_owner_are_refused_with_cause_and_remedy() {
     says(&refusal(folder.path(), &key), &["not a regular file"]);
     says(&refusal(&key, &key), &["no CERTIFICATE", "tls_certificate"]);
     says(&refusal(&certificate, &certificate), &["tls_key"]);
+    let locked = folder.path().join("locked.pem");
+    let pem = fs::read_to_string(&key).unwrap();
+    fs::write(&locked, pem.replace("PRIVATE", "ENCRYPTED PRIVATE")).unwrap();
+    set_mode(&locked, 0o600);
+    let parts = ["no PRIVATE KEY without a password", "tls_key"];
+    says(&refusal(&certificate, &locked), &parts);
+    let pipe = folder.path().join("pipe");
+    mknodat(CWD, &pipe, FileType::Fifo, 0o600.into(), 0).unwrap();
+    says(&refusal(&certificate, &pipe), &["not a regular file"]);
     let (expired, its_key) = files(folder.path(), [2020, 2021]);
     says(
         &refusal(&expired, &its_key),
@@ -165,5 +176,8 @@ fn files_of_an_owner_are_refused_with_cause_and_remedy() {
     fs::write(&certificate, damaged.replace("MII", "AAA")).unwrap();
     says(&refusal(&certificate, &key), &["cannot be used", "X.509"]);
     fs::write(&certificate, vec![b'-'; 2 << 20]).unwrap();
-    says(&refusal(&certificate, &key), &["at most 1048576 bytes"]);
+    says(
+        &refusal(&certificate, &key),
+        &["2097152 bytes, at most 1048576"],
+    );
 }
