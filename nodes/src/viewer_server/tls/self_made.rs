@@ -26,8 +26,8 @@ const NAMES: &str = "names: ";
 const MAX_NAMES: usize = 64;
 /// Validity period: browsers of Apple accept no longer one.
 const VALID: Duration = Duration::from_secs(820 * DAY.as_secs());
-/// Remaining validity at which a new certificate is made.
-const RENEWED: Duration = Duration::from_secs(30 * DAY.as_secs());
+/// Remaining validity at which a start makes a new certificate, so that a server may run this long.
+const RENEWED: Duration = Duration::from_secs(180 * DAY.as_secs());
 
 /// Folder for the state of this user or service.
 pub fn state_folder() -> Result<PathBuf, TlsError> {
@@ -53,12 +53,16 @@ pub fn keep(folder: &Path, addresses: &[IpAddr], now: SystemTime) -> Result<Iden
     let mut names = own_names(addresses);
     if path.exists() {
         let lost = match Identity::read(&path, &path) {
-            Ok(kept) if !addresses.first().is_none_or(|first| kept.names(*first)) => {
+            Ok(kept) => {
+                let is_named = addresses.first().is_none_or(|first| kept.names(*first));
+                let lost = match (is_named, kept.lasts(now, RENEWED)) {
+                    (true, true) => return Ok(kept),
+                    (true, false) => "has ended, or ends within 180 days",
+                    (false, _) => "does not name the address of this machine",
+                };
                 names.extend(kept_names(&path)?);
-                "does not name the address of this machine".to_owned()
+                lost.to_owned()
             }
-            Ok(kept) if !kept.lasts(now, RENEWED) => "has ended or ends soon".to_owned(),
-            Ok(kept) => return Ok(kept),
             Err(error) => format!("cannot be used: {error}"),
         };
         let path = path.display();
@@ -75,7 +79,7 @@ pub fn keep(folder: &Path, addresses: &[IpAddr], now: SystemTime) -> Result<Iden
         .recursive(true)
         .mode(0o700)
         .create(folder)
-        .and_then(|()| AtomicFile::create(&path)?.private())
+        .and_then(|()| AtomicFile::create_private(&path))
         .and_then(|mut file| {
             file.write_all(pem.as_bytes())?;
             file.finish()
