@@ -17,8 +17,8 @@ pub fn reachable(listening: IpAddr) -> Vec<IpAddr> {
     found.extend(ipv6_of(&table("/proc/net/if_inet6")).map(IpAddr::from));
     let mut unique = Vec::new();
     for address in found {
-        let is_heard = address.is_ipv4() || listening.is_ipv6();
-        if is_heard && !address.is_loopback() && !unique.contains(&address) {
+        let is_served = address.is_ipv4() || listening.is_ipv6();
+        if is_served && !address.is_loopback() && !unique.contains(&address) {
             unique.push(address);
         }
     }

@@ -89,7 +89,7 @@ impl ViewerOptions {
             hosts: self.allowed_hosts.clone(),
             origins: self.allowed_origins.clone(),
             token,
-            secure: self.tls != Tls::Off,
+            secure: false,
         })
     }
 

@@ -30,7 +30,7 @@ pub struct RequestAuth {
     pub origins: Vec<String>,
     /// Required secret.
     pub token: Option<String>,
-    /// True if the page is served over TLS.
+    /// True if the page is served over TLS; the server sets it.
     pub secure: bool,
 }
 

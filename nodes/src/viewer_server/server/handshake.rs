@@ -1,4 +1,4 @@
-//! Begin of a connection: a TLS handshake, if the server has a certificate.
+//! Start of a connection: a TLS handshake, if the server has a certificate.
 
 use std::io;
 use std::time::Duration;
