@@ -137,8 +137,14 @@ fn the_page_for_headsets_is_secure_has_the_cells_and_the_button() {
         "0".repeat(token.len())
     ));
     page.wait_for("document.body.textContent.includes('The token is missing or wrong')");
-    // The same page without TLS is not secure there, which is the reason for all this.
+    // A browser without an exception warns; without the server its port is closed.
+    let warned = "document.documentElement.textContent.includes('ERR_CERT_AUTHORITY_INVALID')";
+    Page::open(&chromium, &viewer.url).wait_for(warned);
+    let url = viewer.url.clone();
     drop(viewer);
+    page.go(&url);
+    page.wait_for("document.documentElement.textContent.includes('ERR_CONNECTION_REFUSED')");
+    // The same page without TLS is not secure there, which is the reason for all this.
     let any = ["view", &home.map, "--address", "0.0.0.0", "--port", "0"];
     let plain = Viewer::run(&mut home.command(&any));
     let (_, local) = plain.url.split_once("127.0.0.1").unwrap();
