@@ -1,6 +1,7 @@
 //! `lattice view`: a map in the browser.
 
-use std::net::{IpAddr, SocketAddr};
+use std::io::IsTerminal;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -9,7 +10,7 @@ use lattice_core::voxels::VoxelList;
 use lattice_core::voxels::label_names::LabelNames;
 use lattice_nodes::files::points::{PointFileOptions, is_named_as_points};
 use lattice_nodes::lattice_mapper::cube_m3;
-use lattice_nodes::viewer_server::{self, ViewerOptions};
+use lattice_nodes::viewer_server::{self, Access, Tls, ViewerOptions};
 
 use super::CliResult;
 use crate::cell_size::CellSize;
@@ -28,12 +29,22 @@ pub struct View {
     cells: CellSize,
     #[command(flatten)]
     columns: Columns,
-    /// Address to listen on; any but loopback requires a token
-    #[arg(long, default_value = "127.0.0.1")]
-    address: IpAddr,
+    /// Address to listen on; any but loopback requires a token. By default 127.0.0.1, with --headset 0.0.0.0
+    #[arg(long)]
+    address: Option<IpAddr>,
     /// Port to listen on
     #[arg(long, default_value_t = 8765)]
     port: u16,
+    /// Serve a headset or phone on the same network: HTTPS, which WebXR requires, with a self-made certificate, and a QR code of the
+    /// address with its token. Headsets may publish (`allow_headset` of viewer_server)
+    #[arg(long)]
+    headset: bool,
+    /// Certificate of one's own for --headset, with its chain (PEM)
+    #[arg(long, value_name = "PEM", requires_all = ["headset", "tls_key"])]
+    tls_certificate: Option<PathBuf>,
+    /// Private key of that certificate (PEM)
+    #[arg(long, value_name = "PEM", requires = "tls_certificate")]
+    tls_key: Option<PathBuf>,
     /// As for any ROS node: `--ros-args -r from:=to -p name:=value ...`
     #[arg(last = true)]
     ros_args: Vec<String>,
@@ -44,8 +55,8 @@ impl View {
     pub fn run(self) -> CliResult {
         match self.what.as_slice() {
             [one] if kind(one) != Kind::Params => {
-                let address = SocketAddr::new(self.address, self.port);
-                show(one, &self.cells, self.columns, address)
+                let options = self.options();
+                show(one, &self.cells, self.columns, &options)
             }
             files => {
                 if let Some(other) = files.iter().find(|file| kind(file) != Kind::Params) {
@@ -63,19 +74,70 @@ impl View {
         }
     }
 
+    fn ip(&self) -> IpAddr {
+        let default = match self.headset {
+            true => Ipv4Addr::UNSPECIFIED,
+            false => Ipv4Addr::LOCALHOST,
+        };
+        self.address.unwrap_or(default.into())
+    }
+
+    /// Options of the server of a file.
+    fn options(&self) -> ViewerOptions {
+        let tls = match (&self.tls_certificate, &self.tls_key) {
+            (Some(certificate), Some(key)) => Tls::Files {
+                certificate: certificate.clone(),
+                key: key.clone(),
+            },
+            _ if self.headset => Tls::SelfMade,
+            _ => Tls::Off,
+        };
+        ViewerOptions {
+            tls,
+            ..plain(SocketAddr::new(self.ip(), self.port))
+        }
+    }
+
     fn live(self) -> CliResult {
+        let mut values = vec![
+            ("address", quoted(&self.ip().to_string())),
+            ("port", self.port.to_string()),
+        ];
+        if self.headset {
+            values.extend(["tls", "allow_headset"].map(|name| (name, true.to_string())));
+        }
+        let files = [
+            ("tls_certificate", &self.tls_certificate),
+            ("tls_key", &self.tls_key),
+        ];
+        for (name, path) in files {
+            let Some(path) = path else { continue };
+            let text = path.to_str();
+            let text = text.ok_or_else(|| format!("{}: not UTF-8", path.display()))?;
+            values.push((name, quoted(text)));
+        }
         let mut ros_args = self.ros_args;
         if ros_args.is_empty() {
             ros_args.push("--ros-args".to_owned());
         }
-        for (name, value) in [
-            ("address", format!("'{}'", self.address)),
-            ("port", self.port.to_string()),
-        ] {
+        for (name, value) in values {
             ros_args.extend(["-p".to_owned(), format!("viewer_server:{name}:={value}")]);
         }
         Run::nodes_of(self.what, &["viewer_server"], ros_args).run()
     }
+}
+
+/// Options of a server without TLS.
+fn plain(address: SocketAddr) -> ViewerOptions {
+    ViewerOptions {
+        address,
+        ..ViewerOptions::default()
+    }
+}
+
+/// Text as a YAML scalar.
+fn quoted(text: &str) -> String {
+    format!("'{}'", text.replace('\'', "''"))
 }
 
 /// Kind of input.
@@ -110,15 +172,13 @@ fn is_map(path: &Path) -> bool {
 }
 
 /// Shows a map file, or the map of a log or of points, until the process is ended.
-fn show(path: &Path, cells: &CellSize, columns: Columns, address: SocketAddr) -> CliResult {
+fn show(path: &Path, cells: &CellSize, columns: Columns, server: &ViewerOptions) -> CliResult {
     let options = columns.options(MAX_POINTS, &[path])?;
     if kind(path) == Kind::Points {
-        let (_server, url) = serve(
-            &quantized(path, cells, &options)?,
-            &LabelNames::default(),
-            address,
-        )?;
-        return stay(&url);
+        let list = quantized(path, cells, &options)?;
+        let (_server, access) =
+            viewer_server::serve_labelled(&list, &LabelNames::default(), server)?;
+        return stay(&access);
     }
     #[cfg(feature = "bags")]
     let folder = tempfile::tempdir()?;
@@ -137,11 +197,11 @@ fn show(path: &Path, cells: &CellSize, columns: Columns, address: SocketAddr) ->
             path
         }
     };
-    let (_server, url) = serve_file(path, address)?;
+    let (_server, access) = serve(path, server)?;
     // The map is in memory, so its folder is removed now; the process ends by a signal.
     #[cfg(feature = "bags")]
     drop(folder);
-    stay(&url)
+    stay(&access)
 }
 
 /// Map of a point file on the FCC lattice; prints its cell size.
@@ -172,32 +232,30 @@ fn quantized(path: &Path, cells: &CellSize, options: &PointFileOptions) -> CliRe
 }
 
 /// Serves until the process is ended.
-fn stay(url: &str) -> CliResult {
-    println!("the map is at {url}, until Ctrl-C");
+fn stay(access: &Access) -> CliResult {
+    println!("the map is at {}, until Ctrl-C", access.url);
+    if let Some(text) = access.for_headset(std::io::stdout().is_terminal()) {
+        print!("{text}");
+    }
     loop {
         std::thread::park();
     }
 }
 
-/// Serves a map file; returns the server and its URL.
+/// Serves a map file on loopback; returns the server and its URL.
+#[cfg(feature = "lab")]
 pub fn serve_file(path: &Path, address: SocketAddr) -> CliResult<(viewer_server::Server, String)> {
+    let (server, access) = serve(path, &plain(address))?;
+    Ok((server, access.url))
+}
+
+fn serve(path: &Path, options: &ViewerOptions) -> CliResult<(viewer_server::Server, Access)> {
     let (map, names) = crate::map::read_named(path).map_err(|error| {
         let points =
             "a point file (.ply, .pcd, .las, .laz, .e57, .bt, .ot, .xyz, .txt, .csv, .bin)";
         let logs = "a log (a rosbag2 folder, .mcap, .db3, .bag, each also as .zstd)";
         format!("{error}; what is shown is a map (.lattice), {points}, {logs}, or {PARAMS}")
     })?;
-    serve(&map.into_list(usize::MAX), &names, address)
-}
-
-fn serve(
-    list: &VoxelList,
-    names: &LabelNames,
-    address: SocketAddr,
-) -> CliResult<(viewer_server::Server, String)> {
-    let options = ViewerOptions {
-        address,
-        ..ViewerOptions::default()
-    };
-    Ok(viewer_server::serve_labelled(list, names, &options)?)
+    let list = map.into_list(usize::MAX);
+    Ok(viewer_server::serve_labelled(&list, &names, options)?)
 }

@@ -31,33 +31,44 @@ enum Place {
 impl AtomicFile {
     /// Creates a file for a path; fails if the folder is missing or not writable.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let (file, place) = match fs::metadata(path) {
-            Ok(found) if found.is_dir() => return Err(ErrorKind::IsADirectory.into()),
+        match fs::metadata(path) {
+            Ok(found) if found.is_dir() => Err(ErrorKind::IsADirectory.into()),
             Ok(found) if !found.is_file() => {
-                (File::options().write(true).open(path)?, Place::There)
+                let file = File::options().write(true).open(path)?;
+                Ok(Self::new(file, Place::There))
             }
             found => {
-                let to = path.to_owned();
-                let (file, place) = match unnamed(&folder(path)?) {
-                    Ok(file) => (file, Place::Unnamed(to)),
-                    Err(_) => {
-                        let everybody = fs::Permissions::from_mode(0o666);
-                        let mut named = Builder::new();
-                        let named = named.prefix(".").permissions(everybody);
-                        let (file, at) = named.tempfile_in(folder(path)?)?.into_parts();
-                        (file, Place::Beside(at, to))
-                    }
-                };
+                let created = Self::beside(path, 0o666)?;
                 if let Ok(found) = found {
-                    file.set_permissions(found.permissions())?;
+                    created.out.get_ref().set_permissions(found.permissions())?;
                 }
-                (file, place)
+                Ok(created)
             }
-        };
-        Ok(Self {
-            out: BufWriter::with_capacity(1 << 16, file),
-            place,
-        })
+        }
+    }
+
+    /// Creates a file of mode 0600 for a path, whatever the mode of the file before.
+    #[cfg(feature = "viewer")]
+    pub fn create_private(path: &Path) -> io::Result<Self> {
+        Self::beside(path, 0o600)
+    }
+
+    /// Creates a file, of this mode at most, in the folder of the path.
+    fn beside(path: &Path, mode: u32) -> io::Result<Self> {
+        let to = path.to_owned();
+        let folder = folder(path)?;
+        if let Ok(file) = unnamed(&folder, mode) {
+            return Ok(Self::new(file, Place::Unnamed(to)));
+        }
+        let mut named = Builder::new();
+        let named = { named.prefix(".") }.permissions(fs::Permissions::from_mode(mode));
+        let (file, at) = named.tempfile_in(folder)?.into_parts();
+        Ok(Self::new(file, Place::Beside(at, to)))
+    }
+
+    fn new(file: File, place: Place) -> Self {
+        let out = BufWriter::with_capacity(1 << 16, file);
+        Self { out, place }
     }
 
     /// Syncs the data to disk, then replaces the path.
@@ -89,9 +100,9 @@ fn folder(path: &Path) -> io::Result<PathBuf> {
     Ok(parent.unwrap_or(Path::new(".")).to_owned())
 }
 
-fn unnamed(folder: &Path) -> io::Result<File> {
+fn unnamed(folder: &Path, mode: u32) -> io::Result<File> {
     let flags = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
-    Ok(open(folder, flags, Mode::from_raw_mode(0o666))?.into())
+    Ok(open(folder, flags, Mode::from_raw_mode(mode))?.into())
 }
 
 /// Gives an unnamed file a unique name.
@@ -201,5 +212,29 @@ mod tests {
             assert!(write_text(nowhere, "text").is_err(), "{nowhere:?}");
         }
         write_text(Path::new("/dev/null"), "text").unwrap();
+    }
+
+    #[test]
+    #[cfg(feature = "viewer")]
+    fn a_private_file_is_its_owners_from_its_creation_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("key");
+        fs::write(&path, "old").unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o644)).unwrap();
+        let mut file = AtomicFile::create_private(&path).unwrap();
+        let mode = |found: fs::Metadata| found.permissions().mode() & 0o777;
+        assert_eq!(mode(file.out.get_ref().metadata().unwrap()), 0o600);
+        file.write_all(b"new").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+        file.finish().unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert_eq!(mode(fs::metadata(&path).unwrap()), 0o600);
+        assert_eq!(names(folder.path()), ["key"]);
+        assert!(
+            AtomicFile::create_private(folder.path())
+                .unwrap()
+                .finish()
+                .is_err()
+        );
     }
 }

@@ -4,4 +4,6 @@ pub mod atomic_write;
 pub mod classes;
 pub mod export;
 pub mod points;
+#[cfg(any(feature = "onnx", feature = "viewer"))]
+pub(crate) mod regular_file;
 pub mod semantic;

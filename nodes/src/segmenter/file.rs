@@ -10,7 +10,7 @@ use tract_onnx::prelude::Framework;
 use super::checks::{self, MAX_TENSOR_VALUES};
 use super::names;
 use super::network::{ModelError, Network, Size, Values};
-use super::regular_file::open;
+use crate::files::regular_file::open;
 
 /// Largest model file, bytes: the format is limited to 2 GiB.
 const MAX_MODEL_BYTES: u64 = 1 << 30;

@@ -24,8 +24,6 @@ mod onnx_runtime;
 mod options;
 mod parameters;
 #[cfg(feature = "onnx")]
-mod regular_file;
-#[cfg(feature = "onnx")]
 mod sizes;
 #[cfg(feature = "onnx")]
 mod tract;

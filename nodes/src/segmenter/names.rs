@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::network::MAX_CLASSES;
-use super::regular_file::open;
+use crate::files::regular_file::open;
 
 /// Limit of names text, bytes.
 const MAX_BYTES: u64 = 1 << 20;

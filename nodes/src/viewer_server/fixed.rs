@@ -9,8 +9,9 @@ use lattice_msgs::cdr;
 use lattice_msgs::std_msgs::Header;
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
 
+use super::access::Access;
 use super::broadcast::{Broadcaster, Class, entry, thin};
-use super::options::{ViewerOptions, url};
+use super::options::ViewerOptions;
 use super::server::Server;
 use crate::convert::map::{History, MapStamp, keyframe};
 use crate::hurry::Hurry;
@@ -18,8 +19,8 @@ use crate::hurry::Hurry;
 /// Largest map message, bytes.
 const CHUNK_BYTES: usize = 60_000;
 
-/// Serves a map; returns the server and its URL.
-pub fn serve(list: &VoxelList, options: &ViewerOptions) -> io::Result<(Server, String)> {
+/// Serves a map; returns the server and its URLs.
+pub fn serve(list: &VoxelList, options: &ViewerOptions) -> io::Result<(Server, Access)> {
     serve_labelled(list, &LabelNames::new(), options)
 }
 
@@ -28,7 +29,7 @@ pub fn serve_labelled(
     list: &VoxelList,
     names: &LabelNames,
     options: &ViewerOptions,
-) -> io::Result<(Server, String)> {
+) -> io::Result<(Server, Access)> {
     let broadcaster = Arc::new(Broadcaster::of_file(options.max_clients));
     broadcaster.map_channels("/voxel_map", "/voxel_map_updates");
     if !names.is_empty() {
@@ -53,9 +54,11 @@ pub fn serve_labelled(
     let chunks: Vec<_> = chunks.collect::<Result<_, _>>().map_err(io::Error::other)?;
     broadcaster.change_map(|stream| stream.set_keyframe(chunks));
     let auth = options.request_auth()?;
-    let server = Server::start(options.address, auth.clone(), broadcaster)?;
-    let url = url(server.address(), &auth);
-    Ok((server, url))
+    let identity = options.identity().map_err(io::Error::other)?;
+    let tls = identity.as_ref().map(|identity| identity.config.clone());
+    let server = Server::start(options.address, auth.clone(), tls, broadcaster)?;
+    let access = Access::new(server.address(), &auth, identity.as_ref());
+    Ok((server, access))
 }
 
 fn label_info(names: &LabelNames) -> LabelInfo {

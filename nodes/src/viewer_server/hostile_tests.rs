@@ -33,7 +33,7 @@ fn subscribed(server: &Server, broadcaster: &Broadcaster) -> WebSocket<TcpStream
     socket
 }
 
-fn until(mut met: impl FnMut() -> bool) {
+pub(super) fn until(mut met: impl FnMut() -> bool) {
     let late = Instant::now() + PATIENCE;
     while !met() {
         assert!(Instant::now() < late);

@@ -1,6 +1,6 @@
 //! ROS node of the viewer: subscriptions, server thread and compute thread.
 
-use std::io::Write;
+use std::io::{IsTerminal, Write, stderr};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -9,10 +9,11 @@ use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::tf2_msgs::TFMessage;
 use serde::Serialize;
 
+use super::access::Access;
 use super::bridge::{HandOver, HeadsetTopics, NodeBridge};
 use super::broadcast::{Broadcaster, BroadcasterCounts, Class, MapStream};
 use super::map_source::{MapChange, MapSource};
-use super::options::{ViewerOptions, url};
+use super::options::ViewerOptions;
 use super::parameters::Settings;
 use super::server::Server;
 use super::session::{Input, InputCounts, Inputs, Waiting};
@@ -73,6 +74,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let inputs = Arc::new(Inputs::default());
     let waiting = Arc::new(Waiting::new(limits.events, limits.bytes));
     let auth = viewer.request_auth()?;
+    let identity = viewer.identity()?;
     let (losses, hurry) = (MapLosses::default(), Hurry::default());
     let mut compute_state = ComputeState {
         node: node.clone(),
@@ -103,8 +105,9 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     let sources = Sources::new(&node, &broadcaster, &viewer, &inbox)?;
     let _ = give.send(Parts { sources, headset });
     // Started after the channels exist: clients receive the channel list once.
-    let server = Server::start(viewer.address, auth.clone(), Arc::clone(&broadcaster))?;
-    tell_address(&url(server.address(), &auth), auth.token.is_some());
+    let tls = identity.as_ref().map(|identity| identity.config.clone());
+    let server = Server::start(viewer.address, auth.clone(), tls, Arc::clone(&broadcaster))?;
+    tell_address(&Access::new(server.address(), &auth, identity.as_ref()));
     let maps = losses.subscribe(&node, &inbox, Event::Map, Event::Update)?;
     let on_fixed = inbox.counting(
         &losses.at_inbox,
@@ -157,16 +160,23 @@ struct Parts {
 }
 
 /// Logs the URL of the page. A URL with a token is printed to the terminal only: `/rosout` and log files are public.
-fn tell_address(url: &str, has_token: bool) {
-    match has_token {
+fn tell_address(access: &Access) {
+    let url = &access.url;
+    match access.has_token {
         true => {
             log::info!(
                 "the address of the map contains a token and is printed to the terminal only"
             );
             // A closed terminal is not an error.
-            let _ = writeln!(std::io::stderr(), "the map is at {url}");
+            let _ = writeln!(stderr(), "the map is at {url}");
         }
         false => log::info!("the map is at {url}"),
+    }
+    if let Some(fingerprint) = &access.fingerprint {
+        log::info!("SHA-256 fingerprint of the certificate: {fingerprint}");
+    }
+    if let Some(text) = access.for_headset(stderr().is_terminal()) {
+        let _ = write!(stderr(), "{text}");
     }
 }
 

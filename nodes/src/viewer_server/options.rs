@@ -5,7 +5,9 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 use lattice_runtime::params::{ParamError, Params};
 
+use super::host_addresses::reachable;
 use super::http::RequestAuth;
+use super::tls::{Identity, Tls, TlsError, state_folder};
 
 /// Options of the viewer.
 #[derive(Clone, Debug)]
@@ -18,6 +20,8 @@ pub struct ViewerOptions {
     pub allowed_origins: Vec<String>,
     /// Required secret of clients; empty: none on loopback, else a random one.
     pub token: String,
+    /// Encryption of the connections.
+    pub tls: Tls,
     /// Limit of clients.
     pub max_clients: usize,
     /// Voxel limit of the followed map.
@@ -35,6 +39,7 @@ impl Default for ViewerOptions {
             allowed_hosts: Vec::new(),
             allowed_origins: Vec::new(),
             token: String::new(),
+            tls: Tls::Off,
             max_clients: 16,
             max_voxels: 20_000_000,
             update_period_s: 0.1,
@@ -65,6 +70,7 @@ impl ViewerOptions {
             allowed_hosts: params.string_array("allowed_hosts", &[])?,
             allowed_origins: params.string_array("allowed_origins", &[])?,
             token,
+            tls: tls(params)?,
             max_clients: params.usize_in("max_clients", defaults.max_clients, 1..=60)?,
             max_voxels: params.positive("max_voxels", defaults.max_voxels)?,
             update_period_s: params.f64_in("update_period_s", period_s, 0.02..=10.0)?,
@@ -83,19 +89,43 @@ impl ViewerOptions {
             hosts: self.allowed_hosts.clone(),
             origins: self.allowed_origins.clone(),
             token,
+            secure: false,
         })
+    }
+
+    /// Certificate and key of the server, if it has TLS; a self-made one is kept in the user's folder for state.
+    pub fn identity(&self) -> Result<Option<Identity>, TlsError> {
+        self.tls
+            .identity(state_folder, &reachable(self.address.ip()))
     }
 }
 
-/// URL for a browser.
-pub fn url(address: SocketAddr, auth: &RequestAuth) -> String {
-    let host = match address.ip().is_unspecified() {
-        true => SocketAddr::new(Ipv4Addr::LOCALHOST.into(), address.port()),
-        false => address,
-    };
-    match &auth.token {
-        Some(token) => format!("http://{host}/?token={token}"),
-        None => format!("http://{host}"),
+/// Encryption by the parameters; the files are read at the start of the server.
+fn tls(params: &Params) -> Result<Tls, ParamError> {
+    let is_on = params.bool("tls", false)?;
+    let [certificate, key] = [
+        params.string("tls_certificate", "")?,
+        params.string("tls_key", "")?,
+    ];
+    match (is_on, certificate.is_empty(), key.is_empty()) {
+        (false, true, true) => Ok(Tls::Off),
+        (true, true, true) => Ok(Tls::SelfMade),
+        (true, false, false) => Ok(Tls::Files {
+            certificate: certificate.into(),
+            key: key.into(),
+        }),
+        (false, ..) => {
+            let problem = "expected true where `tls_certificate` or `tls_key` is set";
+            Err(params.invalid("tls", problem))
+        }
+        (true, false, true) => {
+            let problem = "expected the path of the certificate's private key, since `tls_certificate` is set";
+            Err(params.invalid("tls_key", problem))
+        }
+        (true, true, false) => {
+            let problem = "expected the path of the key's certificate, since `tls_key` is set";
+            Err(params.invalid("tls_certificate", problem))
+        }
     }
 }
 
@@ -109,20 +139,22 @@ fn random_token() -> std::io::Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::viewer_server::Access;
 
     #[test]
     fn other_machines_need_a_token() {
         let mut options = ViewerOptions::default();
-        assert_eq!(options.request_auth().unwrap().token, None);
-        assert_eq!(
-            url(options.address, &options.request_auth().unwrap()),
-            "http://127.0.0.1:8765"
-        );
+        let url = |options: &ViewerOptions, auth: &RequestAuth| {
+            Access::new(options.address, auth, None).url
+        };
+        let auth = options.request_auth().unwrap();
+        assert_eq!(auth.token, None);
+        assert_eq!(url(&options, &auth), "http://127.0.0.1:8765");
         options.address.set_ip(Ipv4Addr::UNSPECIFIED.into());
         let [first, second] = [(), ()].map(|()| options.request_auth().unwrap());
         assert_eq!(first.token.as_ref().unwrap().len(), 32);
         assert_ne!(first.token, second.token);
-        assert!(url(options.address, &first).starts_with("http://127.0.0.1:8765/?token="));
+        assert!(url(&options, &first).starts_with("http://127.0.0.1:8765/?token="));
         options.token = "mine".to_owned();
         assert_eq!(
             options.request_auth().unwrap().token.as_deref(),

@@ -13,6 +13,9 @@ const ABOUT: &[About] = about! {
     "address" fixed(SOCKET): "Address to listen on. Any but 127.0.0.1 (or ::1) requires the token.";
     "port" fixed(SOCKET): "Port of the page and the WebSocket; 0: a free one.";
     "token" fixed(SOCKET): "Secret of clients, letters, digits, -, _ and .; empty: none on 127.0.0.1, else a random one, in the address printed to standard error only.";
+    "tls" fixed(SOCKET): "Whether HTTPS and wss are served in place of HTTP and ws: with tls_certificate and tls_key, else with a self-made certificate that is kept with its key.";
+    "tls_certificate" fixed(SOCKET): "File with the certificate and its chain (PEM); empty: a self-made one.";
+    "tls_key" fixed(SOCKET): "File with the private key of the certificate (PEM), not readable by other users.";
     "allowed_hosts" fixed(SOCKET): "Host names of this machine for browsers, besides localhost and addresses.";
     "allowed_origins" fixed(SOCKET): "Allowed cross-origin pages, such as https://viewer.example.";
     "max_clients" fixed(SOCKET): "Limit of clients.";

@@ -38,8 +38,13 @@ impl Growing {
         broadcaster.channel::<LatticeMap>("/voxel_map", Class::Map, false);
         broadcaster.channel::<LatticeMapUpdate>("/voxel_map_updates", Class::Updates, false);
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let server =
-            Server::start(address, RequestAuth::default(), Arc::clone(&broadcaster)).unwrap();
+        let server = Server::start(
+            address,
+            RequestAuth::default(),
+            None,
+            Arc::clone(&broadcaster),
+        )
+        .unwrap();
         let mut source = MapSource::new(2_000_000);
         mapper
             .keyframe()

@@ -95,7 +95,7 @@ pub(super) fn server(max_clients: usize, auth: RequestAuth) -> (Server, Arc<Broa
     broadcaster.channel::<TFMessage>("/tf_static", Class::Newest { depth: 1 }, true);
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
     (
-        Server::start(address, auth, Arc::clone(&broadcaster)).unwrap(),
+        Server::start(address, auth, None, Arc::clone(&broadcaster)).unwrap(),
         broadcaster,
     )
 }
@@ -233,7 +233,8 @@ fn strangers_and_one_client_too_many_are_refused() {
 #[test]
 fn a_taken_port_is_one_clear_line() {
     let (server, broadcaster) = server(1, RequestAuth::default());
-    let Err(error) = Server::start(server.address(), RequestAuth::default(), broadcaster) else {
+    let Err(error) = Server::start(server.address(), RequestAuth::default(), None, broadcaster)
+    else {
         panic!("two servers on one port");
     };
     let error = error.to_string();

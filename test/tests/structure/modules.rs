@@ -74,7 +74,7 @@ const LAYERS: [(&str, &str); 26] = [
     ),
     (
         "nodes/src/segmenter",
-        "checks counts jpeg network colors compressed labels options machine regular_file names file sizes onnx_runtime tract backends parameters worker inside node",
+        "checks counts jpeg network colors compressed labels options machine names file sizes onnx_runtime tract backends parameters worker inside node",
     ),
     (
         "nodes/src/semantic_cloud",
@@ -86,7 +86,7 @@ const LAYERS: [(&str, &str); 26] = [
     ),
     (
         "nodes/src/viewer_server",
-        "protocol session broadcast bridge http server options parameters map_source fixed sources node hostile_tests pause_tests",
+        "protocol session broadcast bridge http host_addresses tls server options access parameters map_source fixed sources node hostile_tests pause_tests tls_tests",
     ),
     (
         "nodes/src/voxel_marker_publisher",

@@ -45,6 +45,7 @@ mod viewer_mixed;
 mod viewer_page;
 mod viewer_planning;
 mod viewer_survey;
+mod viewer_tls;
 mod viewer_words;
 mod viewer_writing;
 

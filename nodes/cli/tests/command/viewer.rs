@@ -40,7 +40,8 @@ impl Viewer {
         Self::run(&mut command)
     }
 
-    fn run(command: &mut Command) -> Self {
+    /// Runs a command that says where the page is.
+    pub fn run(command: &mut Command) -> Self {
         let mut process = command
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -62,7 +63,7 @@ impl Viewer {
                 for line in BufReader::new(stream).lines().map_while(Result::ok) {
                     let word = line
                         .split([' ', ','])
-                        .find(|word| word.starts_with("http://"));
+                        .find(|word| word.starts_with("http://") || word.starts_with("https://"));
                     if let Some(url) = word {
                         let _ = tell.send(url.to_owned());
                     }

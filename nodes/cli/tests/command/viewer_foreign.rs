@@ -14,7 +14,7 @@ use lattice_msgs::sensor_msgs::{PointCloud2, PointField};
 use lattice_msgs::std_msgs::{self, Header};
 use lattice_msgs::tf2_msgs::TFMessage;
 use lattice_msgs::visualization_msgs::{Marker, MarkerArray};
-use lattice_nodes::viewer_server::{Broadcaster, Class, Entry, RequestAuth, Server};
+use lattice_nodes::viewer_server::{Broadcaster, Class, Entry, Identity, RequestAuth, Server, Tls};
 use lattice_runtime::env::Network;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::ros_args::RosArgs;
@@ -86,7 +86,7 @@ fn known_map() -> LatticeMap {
 }
 
 /// A server with one message on each channel, and these messages by their topics.
-fn server() -> (Server, Value) {
+fn server(identity: Option<&Identity>) -> (Server, Value) {
     let broadcaster = Arc::new(Broadcaster::new(4, Activity::default()));
     let mut all = Map::new();
     let map = known_map();
@@ -114,7 +114,13 @@ fn server() -> (Server, Value) {
     kept!("/map_centers", cloud());
     kept!("/tf", transforms());
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    let server = Server::start(address, RequestAuth::default(), Arc::clone(&broadcaster)).unwrap();
+    let server = Server::start(
+        address,
+        RequestAuth::default(),
+        identity.map(|identity| identity.config.clone()),
+        Arc::clone(&broadcaster),
+    )
+    .unwrap();
     (server, Value::Object(all))
 }
 
@@ -150,24 +156,30 @@ pub fn folder() -> Option<OsString> {
 #[test]
 fn the_protocols_own_client_reads_every_kind_of_message_by_both_names() {
     let Some(folder) = folder() else { return };
-    let (server, messages) = server();
-    let url = format!("ws://{}", server.address());
-    for protocol in ["foxglove.websocket.v1", "foxglove.sdk.v1"] {
-        let peer = Command::new("node")
-            .args(["foxglove_peer.mjs", &url, protocol])
-            .current_dir(&folder)
-            .stderr(Stdio::inherit())
-            .output()
-            .unwrap();
-        assert!(peer.status.success(), "{protocol}");
-        let said: Value = serde_json::from_slice(&peer.stdout).unwrap();
-        assert_eq!(said["protocol"], protocol);
-        for (topic, message) in messages.as_object().unwrap() {
-            let read = &said["read"][topic];
-            assert_eq!(alike(read), alike(message), "{topic} by {protocol}");
+    let state = tempfile::tempdir().unwrap();
+    let place = || Ok(state.path().to_owned());
+    let identity = Tls::SelfMade.identity(place, &[Ipv4Addr::LOCALHOST.into()]);
+    for (scheme, identity) in [("ws", None), ("wss", identity.unwrap())] {
+        let (server, messages) = server(identity.as_ref());
+        let url = format!("{scheme}://{}", server.address());
+        for protocol in ["foxglove.websocket.v1", "foxglove.sdk.v1"] {
+            let peer = Command::new("node")
+                .args(["foxglove_peer.mjs", &url, protocol])
+                .env("NODE_EXTRA_CA_CERTS", state.path().join("viewer_tls.pem"))
+                .current_dir(&folder)
+                .stderr(Stdio::inherit())
+                .output()
+                .unwrap();
+            assert!(peer.status.success(), "{scheme} {protocol}");
+            let said: Value = serde_json::from_slice(&peer.stdout).unwrap();
+            assert_eq!(said["protocol"], protocol);
+            for (topic, message) in messages.as_object().unwrap() {
+                let read = &said["read"][topic];
+                assert_eq!(alike(read), alike(message), "{topic} by {protocol}");
+            }
         }
+        server.finish();
     }
-    server.finish();
 }
 
 /// Takes changes of the graph until it has what is asked for: ids by kind and name, and all that was removed.

@@ -80,10 +80,10 @@ const PLANES: &str = "(() => { const { get } = Object.getOwnPropertyDescriptor(X
     Object.defineProperty(XRFrame.prototype, 'trueMeshes', { get }); \
     Object.defineProperty(XRFrame.prototype, 'detectedMeshes', { get() { } }); })()";
 
-const BUTTON: &str = "document.getElementById('mixed')";
+pub const BUTTON: &str = "document.getElementById('mixed')";
 
 /// The emulator's scripts and a room, before any script of the page.
-fn emulate(page: &mut Page, node: &Path, room: &Path) {
+pub fn emulate(page: &mut Page, node: &Path, room: &Path) {
     let read = |path: &str| std::fs::read_to_string(node.join("node_modules").join(path)).unwrap();
     let room = std::fs::read_to_string(room).unwrap();
     for source in [
@@ -99,7 +99,7 @@ fn emulate(page: &mut Page, node: &Path, room: &Path) {
     }
 }
 
-fn capture(node: &Path, room: &str) -> PathBuf {
+pub fn capture(node: &Path, room: &str) -> PathBuf {
     let folder = node.join("node_modules/@iwer/sem/captures");
     folder.join(format!("{room}.json"))
 }

@@ -215,6 +215,16 @@ impl Broadcaster {
         lock(&self.inner).counts.connections_displaced += connections;
     }
 
+    /// Counts a failed TLS handshake.
+    pub fn count_tls_failed(&self) {
+        lock(&self.inner).counts.tls_failed += 1;
+    }
+
+    /// Counts a connection without TLS to a server with TLS.
+    pub fn count_tls_plain(&self) {
+        lock(&self.inner).counts.tls_plain += 1;
+    }
+
     /// Adds a client; `None` if `max_clients` is reached. The receiver wakes the client's task.
     pub fn enter(&self) -> Option<(u64, Receiver<()>)> {
         let mut inner = lock(&self.inner);

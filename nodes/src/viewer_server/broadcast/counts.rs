@@ -13,6 +13,10 @@ pub struct BroadcasterCounts {
     pub clients_stalled: u64,
     /// Connections closed before they became clients, to make room for newer ones.
     pub connections_displaced: u64,
+    /// Connections whose TLS handshake failed or took longer than 5 s.
+    pub tls_failed: u64,
+    /// Connections without TLS to a server with TLS, redirected or refused.
+    pub tls_plain: u64,
     /// Messages sent to clients.
     pub messages_out: u64,
     /// Bytes of these messages.

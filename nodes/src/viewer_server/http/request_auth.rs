@@ -10,11 +10,16 @@ use crate::viewer_server::protocol::SUBPROTOCOLS;
 
 /// Cookie with the token after it was given in a URL.
 const COOKIE: &str = "lattice_token";
+/// The same over TLS. Under one name browsers would keep it, and refuse that of a later server without TLS on this host; the prefix makes
+/// them take it from HTTPS only.
+const SECURE_COOKIE: &str = "__Host-lattice_token";
 
 /// Content security policy: the page loads its own files only.
 const POLICY: &str = "default-src 'none'; script-src 'self'; worker-src 'self'; style-src 'self'; \
      connect-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; \
      frame-ancestors 'none'";
+
+const UNKNOWN_HOST: &[u8] = b"This host name is not allowed: add it to `allowed_hosts`.\n";
 
 /// Conditions for accepting a request.
 #[derive(Clone, Debug, Default)]
@@ -25,6 +30,8 @@ pub struct RequestAuth {
     pub origins: Vec<String>,
     /// Required secret.
     pub token: Option<String>,
+    /// True if the page is served over TLS; the server sets it.
+    pub secure: bool,
 }
 
 /// Response that ends the connection.
@@ -53,8 +60,7 @@ impl RequestAuth {
     /// Decides on a request.
     pub fn decide(&self, head: &Head) -> Decision {
         let Some(host) = head.host.as_deref().filter(|host| self.knows(host)) else {
-            let why = b"This host name is not allowed: add it to `allowed_hosts`.\n";
-            return refuse("421 Misdirected Request", why);
+            return refuse("421 Misdirected Request", UNKNOWN_HOST);
         };
         if head.method != "GET" {
             return refuse("405 Method Not Allowed", b"Only GET is supported.\n");
@@ -66,14 +72,14 @@ impl RequestAuth {
             return refuse("403 Forbidden", why);
         }
         if let Some(token) = &self.token {
-            let given = head.query("token").or_else(|| head.cookie(COOKIE));
+            let given = head.query("token").or_else(|| head.cookie(self.cookie()));
             if !given.is_some_and(|given| same(given, token)) {
                 let why =
                     b"The token is missing or wrong: open the address that the node printed.\n";
                 return refuse("401 Unauthorized", why);
             }
             if head.query("token").is_some() && !head.upgrade {
-                return keep_token(token);
+                return self.keep_token(token);
             }
         }
         match (head.upgrade, files::find(&head.path)) {
@@ -85,6 +91,38 @@ impl RequestAuth {
                 body: file.bytes,
             }),
             (false, None) => refuse("404 Not Found", b"There is no such page.\n"),
+        }
+    }
+
+    fn cookie(&self) -> &'static str {
+        match self.secure {
+            true => SECURE_COOKIE,
+            false => COOKIE,
+        }
+    }
+
+    /// Stores the token in a cookie, and removes it from the URL.
+    fn keep_token(&self, token: &str) -> Decision {
+        let only_tls = match self.secure {
+            true => "; Secure",
+            false => "",
+        };
+        let cookie = self.cookie();
+        Decision::Answer(Response {
+            status: "303 See Other",
+            media_type: "text/plain; charset=utf-8",
+            headers: format!(
+                "Location: /\r\nSet-Cookie: {cookie}={token}{only_tls}; HttpOnly; SameSite=Strict; Path=/\r\n"
+            ),
+            body: b"",
+        })
+    }
+
+    /// Decides on a request without TLS to a server with TLS. A token in it was sent unencrypted, and is not repeated.
+    pub fn decide_without_tls(&self, head: &Head) -> Decision {
+        match head.host.as_deref().filter(|host| self.knows(host)) {
+            Some(host) => Decision::Answer(Response::to_https(host)),
+            None => refuse("421 Misdirected Request", UNKNOWN_HOST),
         }
     }
 
@@ -107,7 +145,11 @@ impl RequestAuth {
     }
 
     fn trusts(&self, origin: &str, host: &str) -> bool {
-        let own = origin.strip_prefix("http://");
+        let scheme = match self.secure {
+            true => "https://",
+            false => "http://",
+        };
+        let own = origin.strip_prefix(scheme);
         own.is_some_and(|own| own.eq_ignore_ascii_case(host))
             || self.origins.iter().any(|known| known == origin)
     }
@@ -126,18 +168,6 @@ fn refuse(status: &'static str, body: &'static [u8]) -> Decision {
         media_type: "text/plain; charset=utf-8",
         headers: String::new(),
         body,
-    })
-}
-
-/// Stores the token in a cookie, and removes it from the URL.
-fn keep_token(token: &str) -> Decision {
-    Decision::Answer(Response {
-        status: "303 See Other",
-        media_type: "text/plain; charset=utf-8",
-        headers: format!(
-            "Location: /\r\nSet-Cookie: {COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/\r\n"
-        ),
-        body: b"",
     })
 }
 
@@ -171,6 +201,16 @@ impl Response {
             media_type: "text/plain; charset=utf-8",
             headers: "Retry-After: 5\r\n".to_owned(),
             body: b"`max_clients` is reached: close another page, or raise it.\n",
+        }
+    }
+
+    /// Redirection of a request without TLS, not to be remembered: the next server may have none.
+    fn to_https(host: &str) -> Self {
+        Self {
+            status: "307 Temporary Redirect",
+            media_type: "text/plain; charset=utf-8",
+            headers: format!("Location: https://{host}/\r\n"),
+            body: b"This port serves HTTPS and wss only: open the https address that the node printed.\n",
         }
     }
 

@@ -12,13 +12,15 @@ use async_tungstenite::tungstenite::protocol::{CloseFrame, Role, WebSocketConfig
 use async_tungstenite::tungstenite::{self, Message};
 use futures::stream::FuturesUnordered;
 use futures::{AsyncReadExt, AsyncWriteExt, SinkExt, StreamExt};
+use futures_rustls::TlsAcceptor;
+use smol::Async;
 use smol::channel::Receiver;
 use smol::future::{or, pending, poll_once, yield_now};
-use smol::{Async, Timer};
 
 use super::connection_limit::ConnectionLimit;
+use super::handshake::{self, Stream};
 use super::rate_limit::RateLimit;
-use super::stream::{ClientStream, Progress};
+use super::stream::{ClientStream, Progress, within};
 use crate::viewer_server::broadcast::{Broadcaster, Outgoing};
 use crate::viewer_server::http::{
     Decision, Head, HeadError, MAX_HEAD_BYTES, RequestAuth, Response,
@@ -37,8 +39,6 @@ const LAST_TIME: Duration = Duration::from_secs(1);
 /// Socket send buffer, bytes.
 const SEND_BUFFER_BYTES: usize = 512 << 10;
 
-type Stream = Async<TcpStream>;
-
 /// Limits of connections before they become clients; clients are limited by [`Broadcaster`].
 #[derive(Default)]
 pub struct ConnectionLimits {
@@ -53,21 +53,31 @@ pub async fn serve(
     stream: TcpStream,
     from: IpAddr,
     auth: Arc<RequestAuth>,
+    tls: Option<TlsAcceptor>,
     broadcaster: Arc<Broadcaster>,
     limits: &ConnectionLimits,
 ) -> io::Result<()> {
     rustix::net::sockopt::set_socket_send_buffer_size(&stream, SEND_BUFFER_BYTES)?;
     stream.set_nodelay(true)?;
-    let mut stream = Async::new(stream)?;
+    let stream = ClientStream::new(Async::new(stream)?);
+    let progress = stream.progress();
     let asking = limits.asking.enter(from);
     broadcaster.count_displaced(limits.asking.take_displaced());
-    let head = within(HEAD_TIME, read_head(&mut stream));
-    let head = asking.served(head).await?;
+    let asked = async {
+        let (mut stream, lacks_tls) = handshake::open(stream, tls, &broadcaster).await?;
+        let head = within(HEAD_TIME, read_head(&mut stream)).await?;
+        Ok((stream, lacks_tls, head))
+    };
+    let (mut stream, lacks_tls, head) = asking.served(asked).await?;
     drop(asking);
-    let answer = match head.map(|head| auth.decide(&head)) {
+    let decide = |head| match lacks_tls {
+        true => auth.decide_without_tls(&head),
+        false => auth.decide(&head),
+    };
+    let answer = match head.map(decide) {
         Ok(Decision::Upgrade(head)) => match broadcaster.enter() {
             Some((id, woken)) => {
-                let done = talk(ClientStream::new(stream), head, id, woken, &broadcaster).await;
+                let done = talk(stream, progress, head, id, woken, &broadcaster).await;
                 if matches!(&done, Err(error) if error.kind() == io::ErrorKind::TimedOut) {
                     broadcaster.count_stalled();
                 }
@@ -114,14 +124,18 @@ async fn read_head(stream: &mut Stream) -> io::Result<Result<Head, HeadError>> {
 
 /// Sends queued messages and handles received ones until either side closes.
 async fn talk(
-    mut stream: ClientStream,
+    mut stream: Stream,
+    progress: Progress,
     head: String,
     id: u64,
     woken: Receiver<()>,
     broadcaster: &Broadcaster,
 ) -> io::Result<()> {
-    let progress = stream.progress();
-    progress.sent(stream.write_all(head.as_bytes())).await?;
+    let upgraded = async {
+        stream.write_all(head.as_bytes()).await?;
+        stream.flush().await
+    };
+    progress.sent(upgraded).await?;
     let offer = broadcaster.offer_of_bridge();
     let longest = Some(offer.max_message_bytes());
     let config = WebSocketConfig::default()
@@ -254,7 +268,7 @@ fn take(
 }
 
 /// Closes the connection with a reason: the rest of an oversized message cannot be skipped.
-async fn too_long(socket: &mut WebSocketStream<ClientStream>, broadcaster: &Broadcaster) {
+async fn too_long(socket: &mut WebSocketStream<Stream>, broadcaster: &Broadcaster) {
     let has_headset = broadcaster.offer_of_bridge().stream_bytes_per_s > 0;
     if let Some(bridge) = broadcaster.bridge().filter(|_| has_headset) {
         bridge.inputs().refused(InputRefusal::TooLong);
@@ -280,7 +294,7 @@ async fn too_long(socket: &mut WebSocketStream<ClientStream>, broadcaster: &Broa
 
 /// Sends one message; [`Outgoing::Close`] is an error.
 async fn send(
-    socket: &mut WebSocketStream<ClientStream>,
+    socket: &mut WebSocketStream<Stream>,
     progress: &Progress,
     next: Outgoing,
 ) -> io::Result<()> {
@@ -294,12 +308,4 @@ async fn send(
     };
     let sent = async { socket.send(message).await.map_err(io::Error::other) };
     progress.sent(sent).await
-}
-
-async fn within<T>(limit: Duration, work: impl Future<Output = io::Result<T>>) -> io::Result<T> {
-    let late = async {
-        Timer::after(limit).await;
-        Err(io::ErrorKind::TimedOut.into())
-    };
-    or(work, late).await
 }

@@ -2,6 +2,7 @@
 
 mod connection;
 pub(super) mod connection_limit;
+mod handshake;
 mod rate_limit;
 pub(super) mod stream;
 
@@ -12,7 +13,9 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use futures_rustls::TlsAcceptor;
 use lattice_runtime::logging::Throttle;
+use rustls::ServerConfig;
 use smol::channel::{Sender, bounded};
 use smol::{Async, LocalExecutor, Timer};
 
@@ -32,10 +35,11 @@ pub struct Server {
 }
 
 impl Server {
-    /// Listens on an address.
+    /// Listens on an address, for TLS alone if there is a configuration of it.
     pub fn start(
         address: SocketAddr,
         auth: RequestAuth,
+        tls: Option<Arc<ServerConfig>>,
         broadcaster: Arc<Broadcaster>,
     ) -> io::Result<Self> {
         let taken = |error: io::Error| {
@@ -51,11 +55,16 @@ impl Server {
         let listener = Async::new(listener)?;
         let (stop, stopped) = bounded::<()>(1);
         let served = Arc::clone(&broadcaster);
+        let auth = RequestAuth {
+            secure: tls.is_some(),
+            ..auth
+        };
+        let tls = tls.map(TlsAcceptor::from);
         let thread = std::thread::Builder::new()
             .name("viewer".to_owned())
             .spawn(move || {
                 let executor = LocalExecutor::new();
-                let accept = accept(&executor, listener, Arc::new(auth), broadcaster);
+                let accept = accept(&executor, listener, Arc::new(auth), tls, broadcaster);
                 let ended = async {
                     // Ends when the sender closes.
                     let _ = stopped.recv().await;
@@ -92,6 +101,7 @@ async fn accept(
     executor: &LocalExecutor<'_>,
     listener: Async<TcpListener>,
     auth: Arc<RequestAuth>,
+    tls: Option<TlsAcceptor>,
     broadcaster: Arc<Broadcaster>,
 ) {
     let limits = Rc::new(ConnectionLimits::default());
@@ -108,15 +118,16 @@ async fn accept(
                 continue;
             }
         };
-        let (auth, broadcaster, limits) = (
+        let (auth, tls, broadcaster, limits) = (
             Arc::clone(&auth),
+            tls.clone(),
             Arc::clone(&broadcaster),
             Rc::clone(&limits),
         );
         executor
             .spawn(async move {
                 if let Err(error) =
-                    connection::serve(stream, from, auth, broadcaster, &limits).await
+                    connection::serve(stream, from, auth, tls, broadcaster, &limits).await
                 {
                     log::debug!("a connection ended: {error}");
                 }

@@ -18,6 +18,18 @@ pub const STALL_TIME: Duration = Duration::from_secs(20);
 /// of 128 KiB. Empty frames are read in a loop within one poll.
 const READS_PER_TURN: u32 = 16;
 
+/// Completes an operation within a time limit.
+pub async fn within<T>(
+    limit: Duration,
+    work: impl Future<Output = io::Result<T>>,
+) -> io::Result<T> {
+    let late = async {
+        Timer::after(limit).await;
+        Err(io::ErrorKind::TimedOut.into())
+    };
+    or(work, late).await
+}
+
 /// Time of the client's last progress.
 #[derive(Clone)]
 pub struct Progress(Rc<Cell<Instant>>);
@@ -55,6 +67,15 @@ impl ClientStream {
             inner,
             progress: Progress(Rc::new(Cell::new(Instant::now()))),
             reads: 0,
+        }
+    }
+
+    /// First byte of the client, which stays to be read.
+    pub async fn first_byte(&self) -> io::Result<u8> {
+        let mut first = [0];
+        match self.inner.peek(&mut first).await? {
+            0 => Err(io::ErrorKind::UnexpectedEof.into()),
+            _ => Ok(first[0]),
         }
     }
 

@@ -34,8 +34,14 @@ pub struct Page {
 impl Page {
     /// Opens an address.
     pub fn open(chromium: &Path, url: &str) -> Self {
+        Self::open_with(chromium, url, &[])
+    }
+
+    /// The same with more options of the browser.
+    pub fn open_with(chromium: &Path, url: &str, options: &[String]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut browser = Command::new(chromium)
+            .args(options)
             .args(OPTIONS.split_whitespace())
             .arg(format!("--user-data-dir={}", folder.path().display()))
             .stdin(Stdio::null())

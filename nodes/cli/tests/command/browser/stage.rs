@@ -99,8 +99,13 @@ impl Stage {
         let chunk = chunk(&map(cells));
         broadcaster.change_map(|stream| stream.set_keyframe(vec![chunk]));
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let server =
-            Server::start(address, RequestAuth::default(), Arc::clone(&broadcaster)).unwrap();
+        let server = Server::start(
+            address,
+            RequestAuth::default(),
+            None,
+            Arc::clone(&broadcaster),
+        )
+        .unwrap();
         Self {
             broadcaster,
             calibration,

@@ -71,6 +71,7 @@ impl Place {
             .current_dir(self.home.path())
             .env("PATH", format!("{}:{path}", bin.display()))
             .env("HOME", self.home.path())
+            .env_remove("XDG_STATE_HOME")
             .env("ROS_DOMAIN_ID", self.domain.id().to_string())
             .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
             .stdin(Stdio::null())
@@ -194,6 +195,14 @@ fn installed(command: &str) -> String {
     }
 }
 
+/// A command with more options, before the arguments of its nodes.
+fn with_options(command: &str, more: &str) -> String {
+    match command.split_once(" -- ") {
+        Some((own, of_nodes)) => format!("{own} {more} -- {of_nodes}"),
+        None => format!("{command} {more}"),
+    }
+}
+
 /// Fails unless a command of `lattice` exists, with its options.
 fn check_options(command: &str, of: &str) {
     let mut words = command.split(' ').skip(1);
@@ -255,7 +264,7 @@ fn every_command_of_the_pages_works() {
             match RULES[rule].2 {
                 Rule::Runs(more) => place.run(&of, &format!("{command} {more}")),
                 Rule::Serves(more, line) => {
-                    let server = place.start(&format!("{command} {more}"));
+                    let server = place.start(&with_options(&command, more));
                     server.wait_for(line, &of);
                     server.end(&of);
                 }

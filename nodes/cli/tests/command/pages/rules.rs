@@ -144,8 +144,8 @@ pub const RULES: &[(&str, &str, Rule)] = &[
     ("docs/headset.md", "lattice run", Works("lattice_mapper")),
     (
         "docs/mixed_reality.md",
-        "lattice run",
-        Works("lattice_mapper"),
+        "lattice view",
+        Serves("--port 0", "the map is at"),
     ),
     (
         "docs/nodes.md",
