@@ -45,6 +45,18 @@ impl AttitudeConvention {
         }
     }
 
+    /// Convention of attitudes that are of the other one once they were converted by this one; `None` if none is.
+    pub fn then(self, other: Self) -> Option<Self> {
+        match (self, other) {
+            (one, other) if one == other => Some(Self::Enu),
+            (Self::Enu, one) | (one, Self::Enu) => Some(one),
+            (Self::PitchUp, Self::Compass) | (Self::Compass, Self::PitchUp) => Some(Self::Ned),
+            (Self::PitchUp, Self::Ned) | (Self::Ned, Self::PitchUp) => Some(Self::Compass),
+            (Self::Compass, Self::Ned) | (Self::Ned, Self::Compass) => Some(Self::PitchUp),
+            _ => None,
+        }
+    }
+
     /// An attitude of this convention as `enu_from_flu`.
     pub fn to_enu(self, attitude: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
         let (roll, pitch, yaw) = attitude.euler_angles();
@@ -80,6 +92,12 @@ mod tests {
             for convention in AttitudeConvention::ALL {
                 let twice = convention.to_enu(&convention.to_enu(&attitude));
                 prop_assert!(twice.angle_to(&attitude) < 1e-9, "{convention:?}");
+            }
+            for (one, other) in [1, 2, 3].into_iter().flat_map(|one| [0, 1, 2, 3].map(|other| (one, other))) {
+                let [one, other] = [one, other].map(|at: usize| AttitudeConvention::ALL[at]);
+                let both = one.then(other).unwrap();
+                let in_turn = other.to_enu(&one.to_enu(&attitude));
+                prop_assert!(both.to_enu(&attitude).angle_to(&in_turn) < 1e-9, "{one:?} {other:?}");
             }
             let ned = AttitudeConvention::Ned.to_enu(&attitude) * Vector3::z();
             // A level sensor stays level.

@@ -98,7 +98,7 @@ fn block(xy: &Matrix2<f64>, z: f64) -> Matrix3<f64> {
     whole
 }
 
-/// The 48 permutations of axes with signs; those about z come first.
+/// The 48 permutations of axes with signs; those that exchange none come first, then those about z.
 fn axes() -> impl Iterator<Item = Matrix3<f64>> {
     let orders: [[usize; 3]; 6] = [
         [0, 1, 2],
@@ -108,9 +108,9 @@ fn axes() -> impl Iterator<Item = Matrix3<f64>> {
         [1, 2, 0],
         [2, 0, 1],
     ];
-    let signs = (0..8_u8).map(|bits| [4, 2, 1].map(|bit| if bits & bit == 0 { 1.0 } else { -1.0 }));
-    signs.flat_map(move |signs: [f64; 3]| {
-        orders.map(|order| {
+    orders.into_iter().flat_map(|order| {
+        (0..8_u8).map(move |bits| {
+            let signs = [4, 2, 1].map(|bit| if bits & bit == 0 { 1.0 } else { -1.0 });
             Matrix3::from_fn(|row, column| match order.get(row) == Some(&column) {
                 true => signs.get(row).copied().unwrap_or(0.0),
                 false => 0.0,

@@ -19,7 +19,7 @@ const UNIT_WITHIN: f64 = 0.02;
 /// Largest acceleration of the positions in a window, m/s²: it tilts the specific force by 3 degrees.
 const MAX_ACCELERATION: f64 = 0.5;
 /// Largest turn in a window whose specific force is used, rad.
-const MAX_TURN_RAD: f64 = 0.2;
+const MAX_TURN_RAD: f64 = 0.8;
 /// Largest turn in half a window whose rate is used, rad: that of the interpolation has one axis.
 const MAX_HALF_TURN_RAD: f64 = 1.2;
 /// Least change of place or tilt to the last window of the slopes, m and rad: a machine that stands has one slope.
@@ -62,6 +62,8 @@ pub enum InertialFinding {
     Turned {
         /// Rotation to add to the stated mount: `base_from_stated_base`.
         turn: UnitQuaternion<f64>,
+        /// True if no other fault explains the windows alike.
+        is_certain: bool,
     },
     /// The axes of the Imu are left-handed.
     LeftHanded,
@@ -268,18 +270,51 @@ impl Evidence<'_> {
             .filter(|(_, cost)| cost.total - least.total < ALIKE)
             .map(|(one, _)| one.fault);
         let first = alike.next()?;
-        let is_certain = alike.all(|other| matches!(other, Fault::Attitude(_)));
+        let is_attitude = |other| matches!(other, Fault::Attitude(_));
+        let is_certain = alike.all(|other| is_attitude(first) && is_attitude(other));
         Some(match first {
             Fault::None => return None,
             Fault::Attitude(convention) => InertialFinding::Attitude {
                 convention,
                 is_certain,
             },
-            Fault::Turned(turn) => InertialFinding::Turned { turn },
+            Fault::Turned(turn) => InertialFinding::Turned { turn, is_certain },
             Fault::LeftHanded => InertialFinding::LeftHanded,
             Fault::Force { is_opposite: true } => InertialFinding::OppositeForce,
             Fault::Force { is_opposite: false } => InertialFinding::ForceAxes,
             Fault::Rate => InertialFinding::RateAxes,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::pose::{InertialSample, InertialWindows};
+
+    proptest! {
+        /// Any numbers leave the check without a panic.
+        #[test]
+        fn hostile_samples_are_survived(
+            samples in prop::collection::vec((any::<i64>(), any::<f64>(), any::<f64>()), 0..200),
+            steady in any::<bool>(),
+        ) {
+            let (mut windows, mut check) = (InertialWindows::default(), InertialCheck::default());
+            for (number, (stamp_ns, force, rate)) in samples.into_iter().enumerate() {
+                let stamp_ns = if steady { number as i64 * 200_000_000 } else { stamp_ns };
+                let sample = InertialSample {
+                    stamp_ns,
+                    force: Some(Vector3::new(force, 0.0, 9.81)),
+                    rate: Some(Vector3::new(rate, force, 0.0)),
+                };
+                if let Some(window) = windows.on_sample(&sample) {
+                    let far = Isometry3::translation(force, rate, 0.0);
+                    check.on_window(&window, &[Isometry3::identity(), far, Isometry3::identity()]);
+                }
+            }
+            let _ = check.finding();
+        }
     }
 }

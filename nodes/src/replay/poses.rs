@@ -284,7 +284,7 @@ impl Log<'_> {
     }
 
     /// The Imu with the most samples that transforms connect with the machine.
-    fn gyroscope(&self, base: &str) -> Result<Option<usize>, TopicError> {
+    pub fn gyroscope(&self, base: &str) -> Result<Option<usize>, TopicError> {
         let candidates = survey::poses(self.bag, Imu::TYPE)?;
         let connected = candidates
             .iter()
