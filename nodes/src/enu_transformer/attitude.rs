@@ -35,12 +35,8 @@ fn mend(options: &TransformerOptions, found: AttitudeConvention) -> String {
 impl AttitudeReport {
     /// Of a contradiction to the way. An estimator of both positions and attitudes has a frame that points anywhere.
     fn of(finding: &AttitudeFinding, options: &TransformerOptions) -> Option<Self> {
-        let is_geodetic = matches!(
-            options.ins.source,
-            InsSource::NavsatfixImu | InsSource::Inspva | InsSource::Inspvax
-        );
         let base_frame = &options.base_frame;
-        let is_forward = is_geodetic && is_machine(base_frame);
+        let is_forward = is_geodetic(options) && is_machine(base_frame);
         let degrees = |rad: &f64| rad.to_degrees().round();
         let (text, is_impossible) = match finding {
             AttitudeFinding::Mirrored {
@@ -123,7 +119,7 @@ impl AttitudeReport {
                     ),
                     false => format!(
                         "by gravity and turning rates {imu} is turned by {turn} from where its transform has it on \
-                         {base_frame}: correct its mount on /tf_static, unless the poses are of turned axes"
+                         {base_frame}: correct its mount on /tf_static, unless the poses are of turned axes or their frame is not level"
                     ),
                 }
             }
@@ -132,10 +128,11 @@ impl AttitudeReport {
                  forward, y left, z up, REP 103)"
             ),
             InertialFinding::OppositeForce => format!(
-                "accelerations of {imu} point down where the poses have up: at rest they are +9.81 m/s² upward (REP 145); \
-                 if the poses are north-east-down, {}",
+                "accelerations of {imu} point down where the poses have up: at rest they are +9.81 m/s² upward (REP 145), \
+                 correct the signs in its driver; if the poses are north-east-down, {}",
                 mend(options, AttitudeConvention::Ned)
             ),
+            InertialFinding::TiltedMap { level_from_map } => of_tilt(level_from_map, imu, options),
             InertialFinding::ForceAxes => format!(
                 "accelerations of {imu} have other axes than its turning rates and the poses: correct its driver"
             ),
@@ -181,6 +178,35 @@ fn fault(convention: Option<AttitudeConvention>, imu: &str) -> String {
         _ => "roll and pitch of the poses have wrong signs or are exchanged",
     };
     format!("{what}, by gravity and turning rates of {imu}")
+}
+
+/// A frame of the poses that is not level by an Imu.
+fn of_tilt(
+    level_from_map: &UnitQuaternion<f64>,
+    imu: &str,
+    options: &TransformerOptions,
+) -> String {
+    let degrees = level_from_map.angle().to_degrees().round();
+    let fault =
+        format!("by gravity of {imu} the frame of the poses is tilted by {degrees} degrees");
+    if is_geodetic(options) {
+        return format!(
+            "{fault}, and turning rates agree with the attitudes: take attitudes relative to east, north, up (REP 103)"
+        );
+    }
+    let before = options.correction.map(|correction| correction.rotation);
+    let (roll, pitch, yaw) = (level_from_map * before.unwrap_or_default()).euler_angles();
+    format!(
+        "{fault}, so z of the map does not point up: set `correction.rpy_rad: [{roll:.3}, {pitch:.3}, {yaw:.3}]`"
+    )
+}
+
+/// True if positions and attitudes are relative to east, north, up.
+fn is_geodetic(options: &TransformerOptions) -> bool {
+    matches!(
+        options.ins.source,
+        InsSource::NavsatfixImu | InsSource::Inspva | InsSource::Inspvax
+    )
 }
 
 /// Roll, pitch and yaw of a rotation, in degrees.
@@ -322,6 +348,35 @@ mod tests {
         let turned = InertialFinding::Turned { turn, is_certain };
         let found = of(turned, other, "base_link").unwrap();
         assert!(found.text.contains("roll 180, pitch 0, yaw 0 degrees") && !found.is_impossible);
+    }
+
+    #[test]
+    fn a_frame_that_is_not_level_is_corrected_by_its_parameter() {
+        let level_from_map = UnitQuaternion::from_euler_angles(FRAC_PI_2, 0.0, 0.0);
+        let of = |options: &TransformerOptions| {
+            let tilted = InertialFinding::TiltedMap { level_from_map };
+            AttitudeReport::of_imu(&tilted, "/imu", options).unwrap()
+        };
+        let mut odometry = options(InsSource::Odometry, "base_link");
+        let found = of(&odometry);
+        let words = "tilted by 90 degrees, so z of the map does not point up: set `correction.rpy_rad: [1.571, 0.000, 0.000]`";
+        assert!(
+            !found.is_impossible && found.text.ends_with(words),
+            "{}",
+            found.text
+        );
+        // What is set already is turned further.
+        odometry.correction = Some(nalgebra::Isometry3::from_parts(
+            nalgebra::Translation3::identity(),
+            level_from_map,
+        ));
+        assert!(
+            of(&odometry).text.ends_with("[3.142, 0.000, 0.000]`"),
+            "{}",
+            of(&odometry).text
+        );
+        let found = of(&options(InsSource::NavsatfixImu, "base_link"));
+        assert!(found.text.ends_with("(REP 103)"), "{}", found.text);
     }
 
     #[test]

@@ -10,6 +10,9 @@ use super::body_pose::Body;
 use super::ins_options::InsSource;
 use super::state::EnuTransformer;
 
+/// Largest turn of a mount in a window, rad: its rate of 0.6 °/s is below what counts between Imu and attitudes.
+const MAX_MOUNT_TURN_RAD: f64 = 0.01;
+
 impl EnuTransformer {
     /// Compares a sample of an Imu with the attitudes; no pose is made of it.
     pub fn on_inertial(&mut self, topic: &str, imu: &Imu) {
@@ -42,17 +45,24 @@ impl EnuTransformer {
         }
     }
 
-    /// A window in the axes of the machine; `None` if the mount is unknown.
+    /// A window in the axes of the machine; `None` if the mount is unknown, or moves as on a turntable.
     fn of_machine(&self, window: &InertialWindow) -> Option<InertialWindow> {
         let frame = self.inertial.frame()?;
         let options = &self.options.ins;
         let is_source = options.source == InsSource::NavsatfixImu;
         let body = Body::Ins(Arc::clone(frame));
-        let base_from_imu = match is_source {
-            true => self.base_from_ins(&body, window.to_ns).ok()?,
-            false if frame.is_empty() => return None,
-            false => self.base_from_body(&body, window.to_ns).ok()?.rotation,
+        let mount = |at_ns| match is_source {
+            true => self.base_from_ins(&body, at_ns).ok(),
+            false if frame.is_empty() => None,
+            false => Some(self.base_from_body(&body, at_ns).ok()?.rotation),
         };
+        let base_from_imu = mount(window.to_ns)?;
+        let middle_ns = window.from_ns.midpoint(window.to_ns);
+        for at_ns in [window.from_ns, middle_ns] {
+            if mount(at_ns)?.angle_to(&base_from_imu) > MAX_MOUNT_TURN_RAD {
+                return None;
+            }
+        }
         if !is_source || options.orientation != AttitudeConvention::Ned {
             return Some(window.turned(|measured| base_from_imu * measured));
         }

@@ -18,7 +18,6 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use crate::lattice;
 
 const START_NS: i64 = 1_700_000_000_000_000_000;
-const STEP_NS: i64 = 100_000_000;
 
 /// A log of a machine that drives a circle, with attitudes in a convention.
 fn write(log: &Path, convention: AttitudeConvention) {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use lattice_core::geodesy::{EnuFrame, Geodetic};
 use lattice_core::pose::AttitudeConvention;
 use lattice_msgs::geometry_msgs;
-use lattice_msgs::sensor_msgs::{Imu, NavSatFix};
+use lattice_msgs::sensor_msgs::{Imu, NavSatFix, NavSatStatus};
 use lattice_nodes::enu_transformer::ins::{InsMessage, InsSource};
 use lattice_nodes::enu_transformer::{AttitudeReport, TransformerOptions};
 use lattice_test::clouds::{SECOND_NS, header, pose};
@@ -72,6 +72,10 @@ fn report(sensor: &Sensor, set: impl Fn(&mut TransformerOptions)) -> Option<Atti
             let at = frame.geodetic_from_enu(&place).unwrap();
             let fix = NavSatFix {
                 header: header("", stamp_ns),
+                status: NavSatStatus {
+                    status: NavSatStatus::STATUS_FIX,
+                    ..NavSatStatus::default()
+                },
                 latitude: at.latitude_deg(),
                 longitude: at.longitude_deg(),
                 altitude: at.height_m,
