@@ -196,6 +196,8 @@ fn of_tilt(
     }
     let before = options.correction.map(|correction| correction.rotation);
     let (roll, pitch, yaw) = (level_from_map * before.unwrap_or_default()).euler_angles();
+    // Not -0.
+    let [roll, pitch, yaw] = [roll, pitch, yaw].map(|rad| (rad * 1e3).round() / 1e3 + 0.0);
     format!(
         "{fault}, so z of the map does not point up: set `correction.rpy_rad: [{roll:.3}, {pitch:.3}, {yaw:.3}]`"
     )

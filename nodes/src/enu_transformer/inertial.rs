@@ -1,4 +1,4 @@
-//! Windows of an Imu that are held against the attitudes of the machine.
+//! Windows of an Imu to compare with the attitudes of the machine.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

@@ -193,7 +193,7 @@ impl Pipeline {
             }
             Role::Ins(Odometry::TYPE) => ins(InsMessage::Odometry(&cdr::from_slice(data)?)),
             Role::Imu => {
-                // Nothing is lost with it.
+                // No pose or cloud depends on it.
                 if let Ok(imu) = cdr::from_slice(data) {
                     machine.on_inertial(topic, &imu);
                 }

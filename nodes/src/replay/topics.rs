@@ -101,7 +101,7 @@ pub enum Role {
     Camera(CameraInput),
     /// INS message of this ROS type.
     Ins(&'static str),
-    /// Imu that the attitudes are held against.
+    /// Imu to compare the attitudes with.
     Imu,
     /// `/tf` or, if true, `/tf_static`.
     Transforms(bool),
