@@ -16,8 +16,7 @@ struct Numbers(u64);
 
 impl Numbers {
     fn uniform(&mut self) -> f64 {
-        let step = |x: u64| x.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
-        self.0 = step(self.0);
+        self.0 = self.0.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
         let high = (self.0 ^ (self.0 >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         (high >> 11) as f64 / (1_u64 << 53) as f64
     }
