@@ -59,7 +59,11 @@ impl EnuTransformer {
     }
 
     /// Mount of a body on tf at a stamp.
-    fn base_from_body(&self, body: &Body, stamp_ns: i64) -> Result<Isometry3<f64>, Missing> {
+    pub(super) fn base_from_body(
+        &self,
+        body: &Body,
+        stamp_ns: i64,
+    ) -> Result<Isometry3<f64>, Missing> {
         let base = &self.options.base_frame;
         match body {
             Body::Ins(frame) if !frame.is_empty() && **frame != **base => {

@@ -25,6 +25,9 @@ impl EnuTransformer {
             }
             Err(refusal) => self.refuse_message(topic, &refusal),
         }
+        if let InsMessage::Imu(imu) = message {
+            self.on_inertial(topic, imu);
+        }
         for refusal in self.ins.take_refused() {
             self.refuse_message(topic, &refusal);
         }

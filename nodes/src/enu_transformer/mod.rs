@@ -11,6 +11,8 @@ mod cloud_times;
 mod counts;
 mod drops;
 mod fixes;
+mod imu_intake;
+mod inertial;
 pub mod ins;
 mod ins_options;
 mod ins_refusal;

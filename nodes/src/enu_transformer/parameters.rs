@@ -18,7 +18,7 @@ const ABOUT: &[About] = about! {
     "ins.inspvax_height" fixed(POSES): "Reference of the INSPVAX height: geoid (its undulation is added) or ellipsoid.";
     "ins.lever_arm_m" fixed(POSES): "Lever arm: reference point of the INS in base_frame (x forward, y left, z up), in place of that of its frame on tf.";
     "ins.boresight_rpy_rad" fixed(POSES): "Boresight: rotation of the INS in base_frame, fixed-axis roll, pitch, yaw, in place of that of its frame on tf.";
-    "ins.orientation" fixed(POSES): "Convention of quaternions: enu (REP 103), ned (north, east, down; x forward, y right, z down) or compass (yaw clockwise from north, roll and pitch of REP 103). Not for inspva, inspvax and tf.";
+    "ins.orientation" fixed(POSES): "Convention of quaternions: enu (REP 103), ned (north, east, down; x forward, y right, z down), compass (yaw clockwise from north, roll and pitch of REP 103), or enu but for roll and pitch: pitch_up (positive with the nose up), roll_left (positive with the left side down), swapped (exchanged). Not for inspva, inspvax and tf.";
     "ins.yaw_offset_deg" fixed(POSES): "Angle added to the yaw of the poses, counterclockwise: magnetic declination to the east as a negative number, or the turn of an antenna baseline. Not for tf.";
     "ins.max_imu_gap_s" fixed(POSES): "Longest gap between two attitudes around a fix (navsatfix_imu).";
     "ins.max_fix_gap_s" fixed(POSES): "Longest gap between two fixes for interpolating positions at the stamps of attitudes (navsatfix_imu); clouds wait that much longer.";

@@ -103,7 +103,8 @@ impl EnuTransformer {
         }
         if is_newest {
             self.clocks.on_step();
-            self.attitudes.on_pose(&pose, &self.options);
+            self.attitudes.on_pose(&pose);
+            self.warn_of_attitude();
             #[cfg(feature = "bags")]
             if let Some(samples) = &mut self.samples {
                 samples.on_pose(&pose);

@@ -14,6 +14,7 @@ use super::attitude::{AttitudeReport, Attitudes};
 use super::cloud_clocks::CloudClocks;
 use super::cloud_notes::{CloudNote, CloudNotes};
 use super::counts::TransformerCounts;
+use super::inertial::Inertial;
 use super::ins::{InsDecoder, InsSource};
 use super::link_orders::LinkOrders;
 use super::options::TransformerOptions;
@@ -53,6 +54,7 @@ pub struct EnuTransformer {
     pub(super) ins: InsDecoder,
     pub(super) poses: PoseBuffer,
     pub(super) attitudes: Attitudes,
+    pub(super) inertial: Inertial,
     /// Order and speed of the poses of the machine in the map.
     pub(super) order: StampOrder<StampedPose>,
     pub(super) speed: SpeedGate<StampedPose>,
@@ -113,6 +115,7 @@ impl EnuTransformer {
             ins: InsDecoder::new(ins),
             poses,
             attitudes: Attitudes::default(),
+            inertial: Inertial::default(),
             mounts,
             waiting: Waiting::new(options.max_waiting_clouds, options.max_waiting_bytes),
             waiting_poses: VecDeque::new(),
@@ -178,8 +181,19 @@ impl EnuTransformer {
         })
     }
 
-    /// Contradiction between the attitudes of all poses so far and the way of the machine.
+    /// Contradiction between the attitudes of all poses so far and the way of the machine, or an Imu.
     pub fn attitude(&self) -> Option<AttitudeReport> {
-        self.attitudes.report(&self.options)
+        self.attitudes
+            .report(self.inertial.finding(), &self.options)
+    }
+
+    /// Warns once of a contradiction of the attitudes.
+    pub(super) fn warn_of_attitude(&mut self) {
+        if !self.attitudes.is_told
+            && let Some(report) = self.attitude()
+        {
+            self.attitudes.is_told = true;
+            log::warn!("{}", report.text);
+        }
     }
 }

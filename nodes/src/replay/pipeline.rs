@@ -192,6 +192,13 @@ impl Pipeline {
                 ins(InsMessage::PoseWithCovariance(&cdr::from_slice(data)?))
             }
             Role::Ins(Odometry::TYPE) => ins(InsMessage::Odometry(&cdr::from_slice(data)?)),
+            Role::Imu => {
+                // No pose or cloud depends on it.
+                if let Ok(imu) = cdr::from_slice(data) {
+                    machine.on_inertial(topic, &imu);
+                }
+                Vec::new()
+            }
             Role::Ins(_) | Role::Camera(_) => Vec::new(),
         })
     }

@@ -83,6 +83,10 @@ pub fn plan(bag: &BagReader, wishes: &TopicWishes) -> Result<TopicPlan, TopicErr
             .iter()
             .map(|(topic, type_name)| (*topic, Role::Ins(type_name))),
     );
+    if poses.odometry.is_none() && poses.source != InsSource::NavsatfixImu {
+        let imu = log.gyroscope(&poses.base_frame)?;
+        roles.extend(imu.map(|topic| (topic, Role::Imu)));
+    }
     let transforms = transforms.into_iter();
     roles.extend(transforms.map(|(topic, is_static)| (topic, Role::Transforms(is_static))));
     let mut plan = TopicPlan {

@@ -284,14 +284,17 @@ impl Log<'_> {
     }
 
     /// The Imu with the most samples that transforms connect with the machine.
-    fn gyroscope(&self, base: &str) -> Result<Option<usize>, TopicError> {
-        let candidates = survey::poses(self.bag, Imu::TYPE)?;
-        let connected = candidates
-            .iter()
-            .filter(|imu| self.tree.connects(base, &imu.frame));
-        let best =
-            connected.max_by_key(|imu| (self.count(imu.topic), std::cmp::Reverse(imu.topic)));
-        Ok(best.map(|best| best.topic))
+    pub fn gyroscope(&self, base: &str) -> Result<Option<usize>, TopicError> {
+        let mut connected = Vec::new();
+        for topic in survey::topics_of(self.bag, Imu::TYPE) {
+            let frame = survey::first::<Imu>(self.bag, topic)?.map(|imu| imu.header.frame_id);
+            let is_connected = |frame: String| self.tree.connects(base, &survey::bare(&frame));
+            if frame.is_some_and(is_connected) {
+                connected.push(topic);
+            }
+        }
+        let most = |topic: &usize| (self.count(*topic), std::cmp::Reverse(*topic));
+        Ok(connected.into_iter().max_by_key(most))
     }
 
     /// Poses by transforms alone, from a frame of the world to the machine.

@@ -101,6 +101,8 @@ pub enum Role {
     Camera(CameraInput),
     /// INS message of this ROS type.
     Ins(&'static str),
+    /// Imu to compare the attitudes with.
+    Imu,
     /// `/tf` or, if true, `/tf_static`.
     Transforms(bool),
 }

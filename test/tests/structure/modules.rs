@@ -36,8 +36,8 @@ const LAYERS: [(&str, &str); 26] = [
     ),
     (
         "nodes/src/enu_transformer",
-        "cloud_clocks cloud_notes cloud_times ins_options options parameters attitude refusals counts body_pose reference samples speed_gate stamp_order ins_refusal fixes ins link_orders waiting \
-         state transforms body_mounts drops verdict sampling placing pose_intake pose_frames machine tf_intake node",
+        "cloud_clocks cloud_notes cloud_times ins_options options parameters attitude inertial refusals counts body_pose reference samples speed_gate stamp_order ins_refusal fixes ins link_orders waiting \
+         state transforms body_mounts imu_intake drops verdict sampling placing pose_intake pose_frames machine tf_intake node",
     ),
     (
         "nodes/src/files/points",

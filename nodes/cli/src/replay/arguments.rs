@@ -64,7 +64,7 @@ pub struct Replay {
     /// Draw the markers of each map as well, and count their bytes; needs --direct, without which a node draws them
     #[arg(long)]
     pub markers: bool,
-    /// Map although the attitudes contradict the way of the machine
+    /// Map although the attitudes contradict the way of the machine, or gravity and turning rates of an Imu
     #[arg(long)]
     pub trust_attitude: bool,
     /// Map without the check of stamps and mounts against the poses, on the first minute

@@ -179,8 +179,9 @@ impl DdsReplay<'_> {
     }
 
     fn player_arguments(&self) -> CliResult<Vec<String>> {
-        let wanted = self.topic(|_| true);
-        let waited = self.topic(|role| !matches!(role, Role::Transforms(_)));
+        // The node compares attitudes with no Imu but that of its poses.
+        let wanted = self.topic(|role| role != Role::Imu);
+        let waited = self.topic(|role| !matches!(role, Role::Transforms(_) | Role::Imu));
         let mut arguments = vec![
             param("bag", &yaml_text(&self.options.bag)),
             param("rate", &format!("{:?}", self.options.rate)),

@@ -2,6 +2,7 @@
 
 mod clouds;
 mod frames;
+mod inertial;
 mod ins;
 mod transforms;
 
