@@ -48,7 +48,7 @@ pub(super) struct Poses {
 /// Poses, and the reason for which others come before them.
 type Found = (Poses, Result<(), String>);
 
-/// A log with what is known of its frames.
+/// A log with its clouds, transforms and frames.
 pub(super) struct Log<'a> {
     pub bag: &'a BagReader,
     pub wishes: &'a TopicWishes,

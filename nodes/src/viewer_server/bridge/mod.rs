@@ -145,7 +145,9 @@ impl Bridge for NodeBridge {
                 Box::pin(async move {
                     let answer = match answer {
                         Some(answer) => answer.await.map_err(words),
-                        None => Err("unknown service".to_owned()),
+                        None => Err(format!(
+                            "unknown service {service}; call one that was advertised"
+                        )),
                     };
                     vec![match answer {
                         Ok(cdr) if cdr.len() <= MAX_ANSWER_BYTES => {
