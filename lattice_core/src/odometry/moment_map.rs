@@ -112,7 +112,7 @@ impl MomentMap {
         }
     }
 
-    /// Moments of the cell of a point, if the cell has any.
+    /// Moments of the cell that contains a point (map frame, metres); `None` for a cell without points.
     pub fn moments_at(&self, point: &Vector3<f64>) -> Option<&Moments> {
         let code = BlockKey::pack(self.lattice.quantize(point)?)?.raw();
         Some(&self.cell(code)?.moments)

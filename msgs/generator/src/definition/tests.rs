@@ -70,7 +70,12 @@ fn faults_have_their_lines() {
         ("int32[0] a\n", "msg", 1, "no length"),
         ("int32[ a\n", "msg", 1, "no `]`"),
         ("int32<=3 a\n", "msg", 1, "only strings"),
-        ("string<=x a\n", "msg", 1, "`x` is no length"),
+        (
+            "string<=x a\n",
+            "msg",
+            1,
+            "length `x` is not an integer above 0",
+        ),
         ("int32[] A=3\n", "msg", 1, "a constant is"),
         ("int32 a\n---\n", "msg", 3, "2 parts"),
         ("int32 a\n", "srv", 1, "1 parts"),

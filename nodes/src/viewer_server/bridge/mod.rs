@@ -33,7 +33,7 @@ const MAX_ANSWER_BYTES: usize = 1 << 20;
 /// Sends a client's message to the node's thread; false if the inbox is full.
 pub type HandOver = Box<dyn Fn(u64, Input) -> bool + Send + Sync>;
 
-/// Bridge to ROS nodes.
+/// Bridge from viewer clients to ROS nodes: services, parameters, goals and headset messages.
 pub struct NodeBridge {
     offer: Offer,
     clients: services::Clients,

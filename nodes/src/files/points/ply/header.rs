@@ -81,7 +81,7 @@ impl Header {
                 }
                 (_, "property", words) => match header.elements.last_mut() {
                     Some(element) => property(words).map(|p| element.properties.push(p)),
-                    None => Err("a property before the first element".to_owned()),
+                    None => Err("a property before the first `element` line".to_owned()),
                 },
                 _ => Err(format!(
                     "{:?} is not a line of a PLY 1.0 header",
