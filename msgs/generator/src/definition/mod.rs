@@ -260,7 +260,7 @@ impl Element {
             return match name {
                 "string" if bound.parse::<usize>().is_ok() => Ok(Self::String),
                 "string" => Err(format!(
-                    "`{text}`: length `{bound}` is not an integer above 0"
+                    "`{text}`: length `{bound}` is not an unsigned integer"
                 )),
                 _ => Err(format!("`{text}`: only strings have such a bound")),
             };
