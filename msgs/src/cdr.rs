@@ -38,8 +38,8 @@ pub enum CdrError {
     },
     /// Data longer than the type.
     #[error(
-        "{type_name} ends {left} bytes before the {length} bytes of the message do; \
-         the sender has another definition of the type"
+        "{left} of {length} bytes are left after {type_name}; the sender has another definition of the type: \
+         use the same version of its package"
     )]
     Trailing {
         /// Rust name of the type.

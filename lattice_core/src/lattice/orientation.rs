@@ -13,10 +13,10 @@ use super::kind::LatticeKind;
 pub use super::named_orientation::Orientation;
 
 impl Orientation {
-    /// Rotation from the axes of the paper to those of the map, computed by square roots only, so that every machine
-    /// gives the same bits.
+    /// Rotation from the axes of Ryde & Brünig 2011 to those of the map.
     ///
-    /// Fails for crystal axes that the lattice does not have. For `Custom`, `Ground` is unknown here: use
+    /// Computed by square roots only, so the bits are the same on every machine. Fails for crystal axes that the
+    /// lattice does not have, and for [`Orientation::Ground`] of a custom lattice, which depends on its basis: use
     /// [`Lattice::with_orientation`](crate::lattice::Lattice::with_orientation).
     pub fn map_from_lattice(self, kind: LatticeKind) -> Result<UnitQuaternion<f64>, LatticeError> {
         let up = match self {

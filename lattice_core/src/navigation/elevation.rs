@@ -149,7 +149,7 @@ pub(super) fn of(
     Ok(elevation)
 }
 
-/// Surface of each cell of a window: the reached one, else that which continues those around.
+/// Surface of each cell of a window: the reached one, else the one that continues its neighbours.
 fn chosen<'a>(
     states: &'a Tiles<ColumnState>,
     reached: &Reached,

@@ -16,7 +16,7 @@
 //!
 //! [`GroundMap`] has the linked surfaces of all floors, and finds paths of a robot on them.
 //!
-//! Every figure depends on the voxels alone, so a grid after any history of changes is that of the map as it is.
+//! Every figure depends on the voxels alone, so a grid after any history of changes is that of the current map.
 
 mod cells;
 mod columns;
@@ -134,7 +134,7 @@ impl Projector {
         }
     }
 
-    /// Grid of the map as it is, for a robot at `robot_m` (map frame, metres).
+    /// Grid of the current map, for a robot at `robot_m` (map frame, metres).
     ///
     /// Without a position the ground is the lowest surface at least half as large as the largest one. `free` is for
     /// [`ProjectionRule::Flat`], which knows no free cell without it.
@@ -153,7 +153,9 @@ impl Projector {
         Ok(cells::paint(&self.states, &reached, &ground))
     }
 
-    /// Grid of the map as it is, and the ground of a square, or of the whole grid; errors with [`ProjectionRule::Flat`].
+    /// Grid of the current map, and the elevation of a square or of the whole grid.
+    ///
+    /// Fails with [`ProjectionRule::Flat`], and if the map is too wide for a grid.
     pub fn grid_and_elevation(
         &mut self,
         robot_m: Option<Vector3<f64>>,
@@ -168,7 +170,9 @@ impl Projector {
         Ok((grid, elevation))
     }
 
-    /// Ground of the map as it is, to search paths on; an error with [`ProjectionRule::Flat`].
+    /// Snapshot of the ground for path searches.
+    ///
+    /// Fails with [`ProjectionRule::Flat`], and if the map is too wide for a grid.
     pub fn ground_map(&mut self) -> Result<GroundMap, GroundPathError> {
         let ProjectionRule::Ground(ground) = self.options.rule else {
             return Err(GroundPathError::FlatRule);
@@ -176,7 +180,7 @@ impl Projector {
         Ok(GroundMap::new(self.graph(&ground)?, ground))
     }
 
-    /// Linked surfaces of the map as it is.
+    /// Linked surfaces of the current map.
     fn graph(&mut self, ground: &GroundOptions) -> Result<Arc<SurfaceGraph>, ProjectionError> {
         if !self.changed.is_empty() {
             self.graph = None;

@@ -61,7 +61,7 @@ impl MomentMap {
         self.cells.len() == 0
     }
 
-    /// Adds points, metres.
+    /// Adds points, map frame, metres.
     pub fn add(&mut self, points_m: &[Vector3<f64>]) {
         for point in points_m {
             self.change(point, 1);
@@ -77,7 +77,7 @@ impl MomentMap {
         }
     }
 
-    /// Subtracts points that were added before, metres.
+    /// Subtracts points that were added before, map frame, metres.
     pub fn subtract(&mut self, points_m: &[Vector3<f64>]) {
         for point in points_m {
             self.change(point, -1);
@@ -112,7 +112,7 @@ impl MomentMap {
         }
     }
 
-    /// Moments of the cell of a point, if the cell has any.
+    /// Moments of the cell that contains a point (map frame, metres); `None` for a cell without points.
     pub fn moments_at(&self, point: &Vector3<f64>) -> Option<&Moments> {
         let code = BlockKey::pack(self.lattice.quantize(point)?)?.raw();
         Some(&self.cell(code)?.moments)

@@ -48,7 +48,7 @@ pub enum TfMiss {
     Disconnected { from: String, to: String },
     /// Time before the history of a frame on the path.
     #[error(
-        "time is {:.6} s before what is kept of frame '{frame}'",
+        "time is {:.6} s before the stored transforms of frame '{frame}'",
         seconds(by_ns)
     )]
     TooOld { frame: String, by_ns: i64 },

@@ -77,7 +77,7 @@ impl RayClearer {
         }
     }
 
-    /// Sets other conditions; the memory for masks stays.
+    /// Replaces the options except `max_bytes`, which [`RayClearer::new`] sets.
     pub fn set_options(&mut self, options: ClearOptions) {
         self.options = options;
     }

@@ -8,7 +8,7 @@ use crate::package::Package;
 /// Messages by package and name.
 pub struct Names<'a> {
     packages: BTreeMap<&'a str, BTreeMap<&'a str, &'a Message>>,
-    /// Path of `lattice_msgs`.
+    /// Rust path of the crate with the message structs: `::lattice_msgs`, or `crate` inside of it.
     pub root: &'static str,
 }
 

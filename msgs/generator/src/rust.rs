@@ -38,7 +38,7 @@ const ACTION_PARTS: [(&str, &str, &str); 5] = [
     ),
 ];
 
-/// Writer of modules.
+/// Writer of the Rust modules of packages.
 pub struct Writer<'a> {
     structs: Structs<'a>,
 }

@@ -27,7 +27,7 @@ pub(crate) enum Damage {
     Bad(String),
 }
 
-/// Decompresses a stream block by block, so that all of what precedes a damage reaches `put`.
+/// Decompresses a stream block by block, so that all data before a damage reach `put`.
 pub(crate) fn decompress_sound(
     mut source: impl Read,
     mut put: impl FnMut(&[u8]) -> io::Result<()>,

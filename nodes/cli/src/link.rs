@@ -27,7 +27,8 @@ impl Link {
             Some(target) => target,
             None => std::env::current_exe()?,
         };
-        fs::create_dir_all(&self.dir).map_err(|e| format!("{}: {e}", self.dir.display()))?;
+        fs::create_dir_all(&self.dir)
+            .map_err(|e| format!("cannot create {}: {e}", self.dir.display()))?;
         for name in node::names() {
             let link = self.dir.join(name);
             make(&target, &link).map_err(|e| format!("{}: {e}", link.display()))?;

@@ -46,7 +46,7 @@ pub(super) struct Playback {
     /// First and last time of the log.
     pub span_ns: (i64, i64),
     pub topics: Vec<RawPublisher>,
-    /// Topics whose queue is blocked by a subscriber.
+    /// For each topic, true while its messages are skipped because a subscriber does not acknowledge.
     pub stuck: Vec<bool>,
     /// Topics in lockstep.
     pub lockstep: Lockstep,

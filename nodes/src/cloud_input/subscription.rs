@@ -41,7 +41,7 @@ pub fn bytes_of(cloud: &Converted) -> usize {
     cloud.as_ref().map_or(0, |cloud| cloud::bytes_of(cloud))
 }
 
-/// Topics of clouds, and what becomes of their messages.
+/// Topics of clouds, with the counters and the handler of their messages.
 pub struct SubscribedClouds {
     /// Names as in the parameters.
     pub topics: Vec<String>,

@@ -97,7 +97,7 @@ pub fn dense_cloud(
     }
 }
 
-/// Consecutive fields `x`, `y`, `z`.
+/// Fields `x`, `y`, `z` from offset 0, each of `size` bytes.
 pub fn xyz_fields(datatype: u8, size: u32) -> Vec<sensor_msgs::PointField> {
     let places = [("x", 0), ("y", size), ("z", 2 * size)];
     places

@@ -17,9 +17,9 @@ use crate::convert::geometry;
 /// An INS message.
 #[derive(Clone, Copy, Debug)]
 pub enum InsMessage<'a> {
-    /// NovAtel.
+    /// NovAtel INSPVA: position, velocity and attitude.
     Inspva(&'a INSPVA),
-    /// NovAtel, extended.
+    /// NovAtel INSPVAX: INSPVA with standard deviations and status.
     Inspvax(&'a INSPVAX),
     /// Position, paired with [`InsMessage::Imu`].
     Fix(&'a NavSatFix),

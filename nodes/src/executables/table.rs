@@ -10,7 +10,7 @@ use crate::{
     semantic_cloud, semantic_icp_server, voxel_marker_publisher,
 };
 
-/// Every node that can share a process, in the order in which data flows.
+/// Nodes that can share a process, in the order of the data flow.
 pub const NODES: &[(&str, Start)] = &[
     ("segmenter", segmenter::node::start),
     ("semantic_cloud", semantic_cloud::node::start),

@@ -22,9 +22,9 @@ pub struct AtomicFile {
 enum Place {
     /// A pipe or device, written directly.
     There,
-    /// An unnamed file, which a kill removes.
+    /// Unnamed file (`O_TMPFILE`) for this path; it vanishes if the process ends before the link.
     Unnamed(PathBuf),
-    /// A temporary name in the folder, for file systems without unnamed files.
+    /// Temporary file in the folder of this path, for file systems without unnamed files.
     Beside(TempPath, PathBuf),
 }
 

@@ -52,7 +52,7 @@ pub struct HeadsetOptions {
     pub queue_size: usize,
     /// True if labels wait for confidences of their stamp.
     pub use_confidence: bool,
-    /// Larger images are rejected, pixels.
+    /// Limit of pixels per image; larger images are rejected.
     pub max_image_pixels: usize,
     /// True for rectified images: `p` of the camera is used, without distortion.
     pub rectified: bool,

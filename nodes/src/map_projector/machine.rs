@@ -198,7 +198,7 @@ impl MapProjector {
         Some(grid_message(grid, header_of(map)))
     }
 
-    /// Ground of the map as it is, to plan on; `None` before the first whole map.
+    /// Snapshot of the ground for path searches; `None` before the first keyframe is complete.
     pub fn ground_map(&mut self) -> Option<Result<GroundMap, GroundPathError>> {
         self.follower.sequence()?;
         let projector = projector_of(&mut self.projector, &self.follower, &self.options);

@@ -27,7 +27,7 @@ pub(super) struct PlanRequest {
 pub(super) struct PlanFailure {
     pub(super) code: u16,
     pub(super) text: String,
-    /// True for what may still come: the map, a transform.
+    /// True if an input has not arrived yet: the map, or a transform.
     pub(super) is_missing: bool,
 }
 

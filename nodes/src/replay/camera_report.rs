@@ -1,4 +1,4 @@
-//! Report of a depth camera in a replay: images, clouds, and what was dropped.
+//! Report of a depth camera in a replay: images, clouds and drops.
 
 use std::fmt;
 

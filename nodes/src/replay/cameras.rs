@@ -118,7 +118,7 @@ pub(super) struct Cameras {
 }
 
 impl Cameras {
-    /// Finds the depth topics of a log, and what belongs to each.
+    /// Finds the depth topics of a log, each with its camera calibration, labels and colours.
     pub fn find(bag: &BagReader, wishes: &CameraWishes) -> Result<Self, TopicError> {
         let images = images::images(bag)?;
         let infos = images::calibrations(bag)?;
@@ -221,7 +221,7 @@ struct Companions<'a> {
 }
 
 impl Companions<'_> {
-    /// The camera of a depth topic, and what it lacks.
+    /// The camera of a depth topic, and the error if a companion topic is missing.
     fn of(&self, depth: &ImageTopic, info: &Calibration) -> (DepthCamera, Option<TopicError>) {
         let wishes = self.wishes;
         let mut missing = None;

@@ -286,7 +286,7 @@ fn find_cloud(bag: &BagReader, name: &str, cameras: &Cameras) -> Result<usize, T
         })
 }
 
-/// Types of clouds and of what becomes clouds, for an error.
+/// Types of clouds and of messages converted to clouds, for an error.
 fn type_names() -> String {
     let clouds = CloudType::ALL.map(CloudType::name).join(", ");
     format!("{clouds}, or {}", cameras::type_names())

@@ -48,7 +48,7 @@ pub(super) struct Poses {
 /// Poses, and the reason for which others come before them.
 type Found = (Poses, Result<(), String>);
 
-/// A log with what is known of its frames.
+/// A log with its clouds, transforms and frames.
 pub(super) struct Log<'a> {
     pub bag: &'a BagReader,
     pub wishes: &'a TopicWishes,
@@ -327,7 +327,8 @@ impl Log<'_> {
             })
     }
 
-    /// `map` where transforms connect it with the frame that poses are in, else that frame.
+    /// Frame of the map: `map_frame` if set, else `map` if transforms connect it with the frame of the poses, else the
+    /// frame of the poses. Poses from transforms alone are always in the latter.
     pub fn map_frame(&self, poses: &Poses) -> String {
         if let Some(map_frame) = &self.wishes.map_frame {
             return map_frame.clone();

@@ -59,7 +59,7 @@ pub struct RunReport {
     /// Topics that were taken for clouds, poses and transforms, and those that were not, with the reason.
     #[serde(default)]
     pub choices: Vec<String>,
-    /// Wall time.
+    /// Wall time of the replay.
     pub wall_s: f64,
 }
 

@@ -21,6 +21,10 @@ pub(super) fn shown(text: &str) -> String {
         .collect()
 }
 
+/// Error for a panic of the backend's library.
+pub(super) const PANICKED: &str =
+    "the backend panicked on an image, see standard error; set the other `backend`";
+
 /// First line of an error, without the chain of operators.
 pub(super) fn first_line(error: &TractError) -> String {
     let text = error.chain().map(|cause| shown(&cause.to_string()));
@@ -41,7 +45,10 @@ pub(super) fn model(model: &ModelProto, known: impl Fn(&str) -> bool) -> Result<
     if unknown.is_empty() {
         return Ok(());
     }
-    Err(format!("unknown operators: {}", unknown.join(", ")))
+    Err(format!(
+        "unknown operators: {}; export the model with others, or set `backend: ort`",
+        unknown.join(", ")
+    ))
 }
 
 fn graph(

@@ -9,6 +9,7 @@ use ort::session::builder::GraphOptimizationLevel;
 use ort::session::{RunOptions, Session};
 use ort::value::{DynValue, TensorElementType, TensorRef};
 
+use super::checks::PANICKED;
 use super::network::{Interrupter, ModelError, Network, Scores, Size, Values};
 use super::{checks, file, sizes};
 
@@ -67,7 +68,7 @@ impl Network for OrtNetwork {
             let output = output.ok_or("the network has no output")?;
             scores_of(&output)
         });
-        catch_unwind(run).unwrap_or_else(|_| Err("the network failed".to_owned()))
+        catch_unwind(run).unwrap_or_else(|_| Err(PANICKED.to_owned()))
     }
 
     fn interrupter(&self) -> Interrupter {

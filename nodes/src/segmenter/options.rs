@@ -12,7 +12,7 @@ const MAX_SIDE: i64 = 1 << 14;
 /// Options of a [`super::Segmenter`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct SegmenterOptions {
-    /// Larger images are rejected, pixels.
+    /// Limit of pixels per image; larger images are rejected.
     pub max_image_pixels: usize,
     /// Normalisation of the colours.
     pub normalisation: Normalisation,

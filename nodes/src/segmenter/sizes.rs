@@ -21,7 +21,7 @@ const MAX_UNFORESEEN: usize = 1 << 12;
 pub(super) enum Problem {
     /// Tensor size above the limit.
     Size(String),
-    /// Anything else.
+    /// Other reason: unknown operators, or an invalid graph.
     Other(String),
 }
 

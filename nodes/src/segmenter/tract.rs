@@ -16,7 +16,7 @@ use tract_onnx::prelude::*;
 use tract_onnx::tract_hir::tract_core::plan::{self, SimplePlan};
 use tract_onnx::tract_hir::tract_core::runtime::RunOptions;
 
-use super::checks::first_line;
+use super::checks::{PANICKED, first_line};
 use super::network::{Interrupter, ModelError, Network, Scores, Size, Values};
 use super::{file, sizes};
 
@@ -73,7 +73,7 @@ impl Network for OnnxNetwork {
             )
         };
         let outputs = catch_unwind(AssertUnwindSafe(run))
-            .map_err(|_| "the network failed".to_owned())?
+            .map_err(|_| PANICKED.to_owned())?
             .map_err(|error| first_line(&error))?;
         let output = outputs.first().ok_or("the network has no output")?;
         scores_of(output)

@@ -17,9 +17,9 @@ use crate::segmenter;
 /// Output of the state machine.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CloudOutput {
-    /// For `points`, with frame and stamp of the depth image.
+    /// Cloud for `points`, with frame and stamp of the depth image.
     Points(PointCloud2),
-    /// For `label_info`: names of the classes in `points`.
+    /// Class names of `points`, for `label_info`.
     LabelInfo(LabelInfo),
 }
 

@@ -34,7 +34,7 @@ pub struct CloudOptions {
     pub labels: LabelSource,
     /// Matching rules of images.
     pub pair: PairOptions,
-    /// Larger images are rejected, pixels.
+    /// Limit of pixels per image; larger images are rejected.
     pub max_image_pixels: usize,
     /// True for rectified images: `p` of the camera is used, without distortion.
     pub rectified: bool,

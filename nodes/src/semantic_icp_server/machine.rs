@@ -131,7 +131,7 @@ impl SemanticIcpServer {
         out
     }
 
-    /// Ends all requests with a reply.
+    /// Cancels the search and answers every request as failed, at the end of the node.
     pub fn finish(&mut self) -> Vec<Output> {
         let mut out = Vec::new();
         let why = "the server ends";

@@ -47,7 +47,7 @@ pub struct ServerOptions {
     pub when_busy: WhenBusy,
     /// Limit of clouds of one session per search.
     pub max_headset_scans: usize,
-    /// Clouds within this time replace each other, ns.
+    /// Age below which the newest cloud is replaced by the next one instead of being kept beside it, ns.
     pub headset_scan_period_ns: i64,
     /// True to track the current pose with each cloud.
     pub track: bool,

@@ -26,7 +26,7 @@ const MAX_MESSAGE_BYTES: usize = 8 << 20;
 /// Limit of frames with stored static transforms.
 const MAX_STATIC_FRAMES: usize = 10_000;
 
-/// Channel message before its serialization.
+/// Deferred serialization of a channel message to CDR.
 pub type Unwritten = Box<dyn FnOnce() -> Result<Vec<u8>, CdrError> + Send>;
 
 /// Creates the subscription of a channel.

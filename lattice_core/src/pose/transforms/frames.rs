@@ -268,11 +268,17 @@ impl Frames {
                 return Err(format!("frame '{name}' is not found by name"));
             }
             if frame.claims.len() > MAX_PARENTS {
-                return Err(format!("frame '{name}' has too many parents"));
+                let parents = frame.claims.len();
+                return Err(format!(
+                    "frame '{name}' has {parents} parents, over {MAX_PARENTS}"
+                ));
             }
             for claim in &frame.claims {
                 if claim.parent >= frames || claim.parent == id {
-                    return Err(format!("frame '{name}' hangs below no other frame"));
+                    let parent = claim.parent;
+                    return Err(format!(
+                        "frame '{name}' of index {id} has parent {parent}, not another index below {frames}"
+                    ));
                 }
                 if let Link::Moving(track) = &claim.link {
                     let valid = track.validate(max_samples);

@@ -52,9 +52,9 @@ impl BasePose {
 /// Points of one sensor, each with the pose of the base at its time.
 #[derive(Clone, Debug, Default)]
 pub struct MountSamples {
-    /// Poses of the base.
+    /// Poses of the base in the map, one per time of points.
     pub poses: Vec<BasePose>,
-    /// Place of the pose in `poses`, and the point in the base frame by the stated mount, metres.
+    /// Index of the pose in `poses`, and the point in the base frame by the stated mount, metres.
     pub points: Vec<(u32, Vector3<f64>)>,
     /// Position of the sensor in the base frame by the stated mount, metres.
     pub sensor_m: Vector3<f64>,

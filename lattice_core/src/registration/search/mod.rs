@@ -2,7 +2,8 @@
 //!
 //! The source is rotated about the vertical in steps. A coarse grid of map scores is correlated with it at all
 //! positions. The best peaks are refined by hill climbing on a finer grid. The same search by labels yields a second
-//! set of hypotheses. After the map matching of Ryde and Hillier's MROL; gravity as in Quatro (arXiv 2203.06612).
+//! set of hypotheses. The method is the map matching of MROL (multi-resolution occupied voxel lists); gravity is
+//! used as in Quatro (arXiv 2203.06612).
 
 mod correlate;
 mod field;

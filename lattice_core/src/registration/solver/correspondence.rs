@@ -96,7 +96,7 @@ impl Correspondence {
         i.base * self.r + along_a * i.a + along_m * self.m
     }
 
-    /// r^T M r.
+    /// Squared Mahalanobis distance, r^T M r.
     #[inline(always)]
     pub fn squared(&self) -> f64 {
         let i = &self.information;

@@ -236,7 +236,11 @@ impl Kind {
                     _ if length.is_empty() => Array::Sequence,
                     Ok(n) if n > 0 && number == length => Array::Fixed(n),
                     Ok(n) if n > 0 => Array::Sequence,
-                    _ => return Err(format!("`{text}`: `{number}` is no length")),
+                    _ => {
+                        return Err(format!(
+                            "`{text}`: length `{number}` is not an integer above 0"
+                        ));
+                    }
                 };
                 (element, array)
             }
@@ -255,7 +259,9 @@ impl Element {
         if let Some(bound) = bound {
             return match name {
                 "string" if bound.parse::<usize>().is_ok() => Ok(Self::String),
-                "string" => Err(format!("`{text}`: `{bound}` is no length")),
+                "string" => Err(format!(
+                    "`{text}`: length `{bound}` is not an unsigned integer"
+                )),
                 _ => Err(format!("`{text}`: only strings have such a bound")),
             };
         }

@@ -15,7 +15,7 @@ pub(super) struct Content {
     pub compressed: bool,
 }
 
-/// Reads the content of a chunk. Memory grows with what is there, up to the stated size.
+/// Reads the content of a chunk. Memory grows with the bytes read, up to the stated size.
 pub(super) fn content(file: &mut File, head: &Head) -> Result<Content, RecordError> {
     let wrong = |reason: String| RecordError::bad(head.place, reason);
     let fields = head.fields();

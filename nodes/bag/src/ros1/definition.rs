@@ -34,12 +34,12 @@ pub(super) const PRIMITIVES: &[(&str, usize, &str)] = &[
 /// Type of a field's elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Kind {
-    /// Number, by its place in the table of primitive types.
+    /// Number: index into [`PRIMITIVES`].
     Number(usize),
     Text,
     Time,
     Duration,
-    /// Message, by its place among the types.
+    /// Message: index into the types of the definition.
     Message(usize),
 }
 

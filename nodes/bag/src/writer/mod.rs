@@ -28,9 +28,9 @@ use sink::{ENCAPSULATION_BYTES, ROS_DISTRO, Sink, SinkError, failed};
 pub struct WriterOptions {
     /// True to replace a bag at the same path.
     pub overwrite: bool,
-    /// Message bytes after which a new storage file begins.
+    /// Message bytes after which a new storage file begins; `None`: no limit.
     pub max_file_bytes: Option<u64>,
-    /// Time span of messages after which a new storage file begins, ns.
+    /// Time span of messages after which a new storage file begins, ns; `None`: no limit.
     pub max_file_ns: Option<i64>,
     /// Compression with zstd.
     pub compression: Compression,

@@ -30,7 +30,7 @@ use methods::{MethodName, register_once};
 use options::SearchOptions;
 use progress::{Shown, milliseconds};
 
-/// `lattice calibrate`, of a cloud or of what a subcommand names.
+/// Command `lattice calibrate`: pose of a cloud, or a subcommand.
 pub enum CalibrateCommand {
     /// Pose of a cloud in a map.
     Cloud(Box<Calibrate>),

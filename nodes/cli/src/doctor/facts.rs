@@ -121,7 +121,7 @@ pub struct Endpoint {
     pub role: GraphRole,
     /// Full name of its topic or service.
     pub topic: String,
-    /// Full name of its node, or a GUID.
+    /// Full name of its node, or the GID of the endpoint in hexadecimal if its participant announces no ROS node.
     pub node: String,
     /// GUID prefix of its participant.
     pub participant: Option<String>,

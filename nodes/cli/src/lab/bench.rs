@@ -166,7 +166,7 @@ const OUTPUTS: [Choice<QuantizeOutput>; 3] = [
     ),
 ];
 const BATCH: &str = "The batch quantizer with the best instructions of this machine";
-const PORTABLE: &str = "The batch quantizer with what every machine of the target has";
+const PORTABLE: &str = "The batch quantizer with the baseline instructions of the target";
 const PAPER27: &str = "The nearest of 27 candidates, as Ryde & Brünig 2011 do it";
 
 /// Values of `--store`.

@@ -34,9 +34,9 @@ pub enum Evaluate {
     Town(Many),
     /// Calibrate a headset in captured rooms to maps of robots whose sensors are below or above the tables
     Rooms(Rooms),
-    /// Find parts of a given scan in another scan of the same place, without a start: what verdicts are worth there
+    /// Find parts of a given scan in another scan of the same place, without a start: reliability of the verdicts
     Scans(Box<OfScans>),
-    /// Compare what verdicts of other evaluations stated with what was observed
+    /// Compare the error probabilities of verdicts of other evaluations with the observed errors
     Reliability(Reliability),
     /// Drive a lidar through simulated scenes, with motion during each scan, and register its scans: drift and verdicts
     Odometry(OfDrives),
@@ -121,7 +121,7 @@ const SCENES: [Choice<Scene>; 4] = [
 
 /// Values of `--pivot`.
 const PIVOTS: [Choice<Pivot>; 2] = [
-    ("view", "The midst of what is seen", Pivot::View),
+    ("view", "The centroid of the visible points", Pivot::View),
     ("headset", "The headset", Pivot::Headset),
 ];
 

@@ -54,7 +54,7 @@ const LMS200: &str = "Three SICK LMS200, one of them on a turntable";
 /// Options of `lattice simulate bobcat`.
 #[derive(Args)]
 pub struct Bobcat {
-    /// Directory of the log; it gets the rosbag2 files, and `truth/` with what no sensor knows
+    /// Directory of the log; it gets the rosbag2 files, and `truth/` with the ground truth
     #[arg(long, default_value = "bobcat")]
     out: PathBuf,
     /// The same seed gives the same bytes

@@ -73,7 +73,7 @@ pub struct Replay {
     /// Print the report as JSON
     #[arg(long)]
     pub json: bool,
-    /// Port of a viewer for one of the maps.
+    /// Port of a viewer for the FCC map, or else the first; `None`: no viewer.
     #[arg(skip)]
     pub viewer: Option<u16>,
 }

@@ -171,7 +171,11 @@ impl NodeProcess {
                 Ok(line) => self.seen.push(line),
                 Err(error) if error.is_timeout() => {
                     let limit_s = END_TIME.as_secs();
-                    return Err(format!("{} did not end within {limit_s} s", self.name).into());
+                    return Err(format!(
+                        "{} did not end within {limit_s} s of SIGINT, so its report is missing",
+                        self.name
+                    )
+                    .into());
                 }
                 Err(_) => break,
             }

@@ -36,7 +36,7 @@ pub struct Security {
     pub keystore: Option<PathBuf>,
     /// `ROS_SECURITY_ENCLAVE_OVERRIDE`: overrides the enclave of the arguments.
     pub enclave: Option<String>,
-    /// True: without valid files no participant is created.
+    /// True if `ROS_SECURITY_STRATEGY` is `Enforce`: without valid files no participant is created.
     pub enforced: bool,
 }
 

@@ -28,12 +28,12 @@ pub struct GraphEndpoint {
     pub node: String,
 }
 
-/// A publisher, subscription or server of another process, with what it announces.
+/// Publisher, subscription or server of another process, with type and QoS.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RemoteEndpoint {
     /// Role, topic and node.
     pub endpoint: GraphEndpoint,
-    /// Type and QoS; `None` of a server.
+    /// Type and QoS; `None` for a server.
     pub announced: Option<Announced>,
     /// GUID prefix of its participant in hexadecimal, which begins with the id of the DDS vendor; `None` on Zenoh.
     pub participant: Option<String>,
@@ -135,7 +135,7 @@ impl DiscoveredGraph {
         all.into_iter().map(|of| of.endpoint).collect()
     }
 
-    /// All known endpoints with what they announce.
+    /// All discovered endpoints with type and QoS.
     pub(crate) fn all_announced(&self) -> Vec<RemoteEndpoint> {
         let known = lock(&self.0);
         let endpoint = |(id, of): (&EndpointId, &Known)| RemoteEndpoint {

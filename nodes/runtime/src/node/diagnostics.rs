@@ -62,6 +62,8 @@ impl Diagnostics {
     }
 
     /// Sets the status of `task` with its values. It is repeated at 1 Hz until set again.
+    ///
+    /// A new task is ignored if the process has 1000 already.
     pub fn set<K: Display, V: Display>(
         &self,
         task: &str,

@@ -43,7 +43,7 @@ pub enum MapMessageError {
         found: usize,
     },
     /// Chunk index outside the number of chunks.
-    #[error("chunk {chunk} of {chunks}")]
+    #[error("chunk {chunk} is outside 0..{chunks}")]
     Chunk {
         /// Number of the chunk in the message, from 0.
         chunk: u32,
@@ -51,6 +51,6 @@ pub enum MapMessageError {
         chunks: u32,
     },
     /// Invalid lattice frame.
-    #[error("map_from_lattice is not a pose: a number is not finite or the rotation is zero")]
+    #[error("`map_from_lattice` is not a pose: a number is not finite or the quaternion is zero")]
     Frame,
 }

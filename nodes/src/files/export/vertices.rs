@@ -36,9 +36,10 @@ impl SharedVertices {
         }
     }
 
-    /// Identifier of a corner of cell `w`: a cell and the corner's number in it.
+    /// Identifier of a corner of the cell with this index, equal for all cells that share the corner: a cell, and the
+    /// number of the corner in it.
     ///
-    /// `None` if there is no such corner.
+    /// `None` if there is no such corner, or an index overflows.
     pub fn name(&self, [x, y, z]: LatticeIndex, corner: u16) -> Option<(LatticeIndex, u16)> {
         let &([dx, dy, dz], number) = self.owners.get(usize::from(corner))?;
         let w = [x.checked_add(dx)?, y.checked_add(dy)?, z.checked_add(dz)?];

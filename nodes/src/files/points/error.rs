@@ -17,10 +17,10 @@ pub enum PointFileError {
         /// Error of the system.
         source: io::Error,
     },
-    /// Unknown format by content and extension.
+    /// Format that neither content nor extension identifies.
     #[error(
         "cannot tell the format from the content or the extension {extension:?}: \
-         name the file .ply, .pcd, .las, .laz, .e57, .bt, .ot, .xyz, .txt, .csv or .bin, followed by .bz2 if packed"
+         name the file .ply, .pcd, .las, .laz, .e57, .bt, .ot, .xyz, .txt, .asc, .csv or .bin, followed by .bz2 if packed"
     )]
     UnknownFormat {
         /// The extension, without .bz2.

@@ -33,7 +33,7 @@ const MAX_ANSWER_BYTES: usize = 1 << 20;
 /// Sends a client's message to the node's thread; false if the inbox is full.
 pub type HandOver = Box<dyn Fn(u64, Input) -> bool + Send + Sync>;
 
-/// Bridge to ROS nodes.
+/// Bridge from viewer clients to ROS nodes: services, parameters, goals and headset messages.
 pub struct NodeBridge {
     offer: Offer,
     clients: services::Clients,
@@ -145,7 +145,9 @@ impl Bridge for NodeBridge {
                 Box::pin(async move {
                     let answer = match answer {
                         Some(answer) => answer.await.map_err(words),
-                        None => Err("unknown service".to_owned()),
+                        None => Err(format!(
+                            "unknown service {service}; call one that was advertised"
+                        )),
                     };
                     vec![match answer {
                         Ok(cdr) if cdr.len() <= MAX_ANSWER_BYTES => {

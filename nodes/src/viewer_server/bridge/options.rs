@@ -9,7 +9,7 @@ pub struct BridgeOptions {
     pub mapper: String,
     /// Name of the bag player.
     pub player: String,
-    /// Nodes whose parameters are accessible.
+    /// Nodes whose parameters clients may read and set.
     pub parameter_nodes: Vec<String>,
     /// Topic of goals (`geometry_msgs/PoseStamped`).
     pub goal_topic: String,

@@ -91,7 +91,9 @@ impl<'a> ClientSession<'a> {
                 let refuse =
                     |why: &str| SessionAction::Reply(protocol::service_failure(service, call, why));
                 if service as usize >= self.offer.services.len() {
-                    return refuse("unknown service; writing requires `allow_write`");
+                    return refuse(&format!(
+                        "unknown service {service}; others need `allow_write` or `allow_headset`"
+                    ));
                 }
                 if encoding != b"cdr" {
                     return refuse("the encoding of requests must be cdr");

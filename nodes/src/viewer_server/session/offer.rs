@@ -14,8 +14,7 @@ pub struct OpenTopic {
     pub name: String,
     /// Type of its messages.
     pub type_name: &'static str,
-    /// Largest message of a headset topic, which is streamed without replies; `None`:
-    /// each message has a reply.
+    /// Limit of bytes per message of a headset topic, which sends no replies; `None`: each message has a reply.
     pub stream_bytes: Option<usize>,
 }
 

@@ -67,7 +67,7 @@ const CAMERAS: [Choice<ImageCamera>; 2] = [
     ("robot", "On the walk of a robot", ImageCamera::Robot),
     (
         "headset",
-        "Of someone who looks at things",
+        "On the head of a person who looks at furniture",
         ImageCamera::Headset,
     ),
 ];

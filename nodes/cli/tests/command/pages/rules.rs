@@ -192,6 +192,7 @@ pub const RULES: &[(&str, &str, Rule)] = &[
         Works("map_projector"),
     ),
     ("docs/navigation.md", "lattice map export", Runs("")),
+    ("docs/queries.md", "lattice map query", Runs("")),
     ("docs/octomap.md", "lattice map export", Runs("")),
     ("docs/octomap.md", "lattice quantize map.bt", Runs("")),
     ("docs/odometry.md", "lattice replay LOG", Runs("--direct")),

@@ -70,7 +70,9 @@ impl Answers {
         }
         drop(done);
         if !wait_for(&all_done, deadline) {
-            log::warn!("not every request was answered");
+            log::warn!(
+                "some requests were not answered before the node ended; their clients wait for their timeouts"
+            );
         }
         writers
     }

@@ -31,14 +31,14 @@ const QOS: ServiceQos = ServiceQos {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CallError {
-    /// No server is discovered.
-    #[error("no server of {name}")]
+    /// No server was discovered within the timeout.
+    #[error("no server of {name} is discovered: start its node, or see `lattice doctor`")]
     NoServer {
         /// Full name of the service.
         name: String,
     },
     /// The server did not reply in time.
-    #[error("{name} has not replied within {patience_s} s")]
+    #[error("{name} did not reply within {patience_s} s; call again when its node has less work")]
     Late {
         /// Full name of the service.
         name: String,

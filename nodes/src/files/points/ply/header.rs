@@ -81,7 +81,7 @@ impl Header {
                 }
                 (_, "property", words) => match header.elements.last_mut() {
                     Some(element) => property(words).map(|p| element.properties.push(p)),
-                    None => Err("a property before the first element".to_owned()),
+                    None => Err("a property before the first `element` line".to_owned()),
                 },
                 _ => Err(format!(
                     "{:?} is not a line of a PLY 1.0 header",
@@ -124,7 +124,10 @@ fn property(words: &[&str]) -> Result<Property, String> {
         ["list", count, item, name] => {
             let (count, item) = (scalar(count)?, scalar(item)?);
             if count.is_float() {
-                return Err("the length of a list must be an integer".to_owned());
+                let name = shorten(name);
+                return Err(format!(
+                    "the length of list {name:?} is a float, not an integer type"
+                ));
             }
             let name = (*name).to_owned();
             Ok(Property::List { name, count, item })

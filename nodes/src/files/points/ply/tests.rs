@@ -79,11 +79,11 @@ const WRONG_HEADERS: &str = r#"
     ply;format ascii 2.0;            | line 2: "format ascii 2.0" is not a line of a PLY 1.0 header
     ply;format base64 1.0;           | line 2: unknown format "base64"
     ply;end_header;                  | line 2: no line gives the format
-    ply;property int x;              | line 2: a property before the first element
+    ply;property int x;              | line 2: a property before the first `element` line
     ply;element vertex -1;           | line 2: "-1" is not a number of elements
     ply;element v 1;property half x; | line 3: unknown type "half"
     ply;element v 1;property list float x y; | line 3: unknown type "x"
-    ply;element v 1;property list float int x; | line 3: the length of a list must be an integer
+    ply;element v 1;property list float int x; | line 3: the length of list "x" is a float, not an integer type
     ply;format ascii 1.0;end_header; | line 3: the header has no element vertex"#;
 
 #[test]
