@@ -37,7 +37,7 @@ pub struct Elevation {
     pub height: usize,
     /// Height of the surface, map frame, metres.
     pub elevation_m: Vec<f32>,
-    /// Inclination, radians: the smaller one of both sides along each axis, so that a step has none.
+    /// Inclination, radians; that of the ground on either side for a step that the robot drives over.
     pub slope_rad: Vec<f32>,
     /// Height of the step at the cell, metres.
     pub step_m: Vec<f32>,

@@ -6,7 +6,8 @@
 //!    heights are finer than the cells. Samples near the centre of a column of the grid are those of the column.
 //! 2. **Spans.** The samples of a column in order of height, separated where the robot fits between two of them.
 //!    The top of a span is a surface if its samples surround the centre.
-//! 3. **Inclination** of a surface along an axis: the smaller one of both sides, so that a step has none.
+//! 3. **Inclination** of a surface along an axis: the median of both sides and of the lesser inclination of the ground
+//!    beyond, and no more than the steeper one if the rise is a step that the robot drives over. So a step has none.
 //! 4. **Step**: range of the samples about the inclination of the ground beyond. A ramp has none, a curb its height.
 //! 5. **Reach.** Standable surfaces of neighbouring columns are linked where a step is low enough, and the robot
 //!    reaches all that are linked with the surface below it.

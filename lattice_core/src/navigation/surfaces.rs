@@ -50,7 +50,10 @@ fn spans<'a>(
     window.chunk_by(move |below, above| above.z - below.z < room_m)
 }
 
-/// Samples of a span within a step of its top that no other sample covers: the underside of a deck is none of them.
+/// Samples of a span within a step of its top that no other of these covers: the underside of a deck is none of them.
+///
+/// Covered samples cover none: those of a riser, each half a cell from the next, would hide the ground at its foot. So each
+/// sample has one of the layer within half a cell.
 fn layer(columns: &Columns, span: &[Vector3<f64>], ground: &GroundOptions) -> Layer {
     let top_m = span.last().map_or(0.0, |sample| sample.z);
     let low_m = top_m - layer_m(columns, ground);
@@ -58,13 +61,14 @@ fn layer(columns: &Columns, span: &[Vector3<f64>], ground: &GroundOptions) -> La
     let near = span.get(begin..).unwrap_or_default();
     let half_m = 0.5 * columns.side_m();
     let covers = |a: &Vector3<f64>, b: &Vector3<f64>| (a.xy() - b.xy()).amax() < half_m;
-    let higher = |i: usize| near.get(i + 1..).unwrap_or_default();
-    let is_covered = |i: usize, sample| higher(i).iter().any(|above| covers(above, sample));
-    let open = near
-        .iter()
-        .enumerate()
-        .filter(|(i, sample)| !is_covered(*i, sample));
-    open.map(|(_, sample)| *sample).collect()
+    let mut layer = Layer::new();
+    for sample in near.iter().rev() {
+        if !layer.iter().any(|above| covers(above, sample)) {
+            layer.push(*sample);
+        }
+    }
+    layer.reverse();
+    layer
 }
 
 /// Tests whether the centre of the column is among samples: none of eight half planes is without any.

@@ -36,8 +36,17 @@ pub(super) fn standable(
     let judge = |(surface, layer): (&Surface, &Layer)| {
         let [x, y] =
             [0, 1].map(|axis| Profile::new(columns, states, column, surface, axis, link_m));
-        let slope = x.inclination().hypot(y.inclination());
-        let step_m = step_m(layer, &x.beyond(ground), &y.beyond(ground));
+        // Surfaces of a profile are not quite on its axis: what the other axis adds to their heights is taken off.
+        let [across_y, across_x] =
+            [&x, &y].map(|profile| profile.inclination(0.0, ground.max_step_m));
+        let slope_x = x.inclination(across_x, ground.max_step_m);
+        let slope_y = y.inclination(across_y, ground.max_step_m);
+        let slope = slope_x.hypot(slope_y);
+        let step_m = step_m(
+            layer,
+            &x.beyond(across_x, ground),
+            &y.beyond(across_y, ground),
+        );
         let within = |value: f64, limit: f64| value <= limit * (1.0 + SLACK);
         Terrain {
             slope,
@@ -61,9 +70,11 @@ fn step_m(layer: &[Vector3<f64>], x: &[f64], y: &[f64]) -> f64 {
     pairs.map(|(gx, gy)| range(gx, gy)).fold(f64::MAX, f64::min)
 }
 
-/// Inclinations of the ground along one axis through a surface: beyond and up to it on either side.
+/// Profile of the ground along one axis through a surface.
 struct Profile {
-    sides: [[Option<f64>; 2]; 2],
+    axis: usize,
+    /// On either side: from the surface to that [`BASELINE`] strides away, and from there on by as much, metres.
+    sides: [[Option<Vector3<f64>>; 2]; 2],
 }
 
 impl Profile {
@@ -78,37 +89,69 @@ impl Profile {
         let near = BASELINE * columns.stride();
         let side = |sign: i32| {
             let mut at = (column, surface.at_m);
-            let mut inclination = || {
+            let mut baseline = || {
                 let from_m = at.1;
                 for _ in 0..near {
                     at = next(states, at, axis, sign, link_m)?;
                 }
-                let apart_m = at.1[axis] - from_m[axis];
-                (apart_m.abs() > 0.5 * columns.resolution_m).then(|| (at.1.z - from_m.z) / apart_m)
+                let baseline_m = at.1 - from_m;
+                (baseline_m[axis].abs() > 0.5 * columns.resolution_m).then_some(baseline_m)
             };
-            let beside = inclination();
-            [beside, beside.and_then(|_| inclination())]
+            let beside = baseline();
+            [beside, beside.and_then(|_| baseline())]
         };
         Profile {
+            axis,
             sides: [side(-1), side(1)],
         }
     }
 
-    /// The smaller one of both sides; 0 where they differ in sign.
-    fn inclination(&self) -> f64 {
-        match self.sides.map(|[beside, _]| beside) {
-            [Some(a), Some(b)] if a * b <= 0.0 => 0.0,
-            [Some(a), Some(b)] if a.abs() < b.abs() => a,
-            [_, Some(one)] | [Some(one), None] => one,
-            [None, None] => 0.0,
+    /// Rise per metre along the axis, where the ground rises by `across` per metre along the other one.
+    fn rise(&self, baseline_m: &Vector3<f64>, across: f64) -> f64 {
+        let across_m = baseline_m[1 - self.axis];
+        (baseline_m.z - across * across_m) / baseline_m[self.axis]
+    }
+
+    /// Inclination of the surface; 0 where both sides differ in sign.
+    ///
+    /// It is the median of both sides and of the lesser inclination beyond. On a plane the smaller one of two sides would be
+    /// too small by the noise of the points. Beside a step the side without it is left, as the ground beyond is no steeper.
+    ///
+    /// The mean of a surface that spans a step is between the two levels, so that both sides are inclined. Where the rise
+    /// from side to side is one that the robot drives over, the inclination is no more than that of the steeper ground beyond.
+    fn inclination(&self, across: f64, max_step_m: f64) -> f64 {
+        let rise = |baseline_m: Vector3<f64>| self.rise(&baseline_m, across);
+        let beside_m = self.sides.map(|[beside_m, _]| beside_m);
+        let beyond = self.sides.map(|[_, beyond_m]| beyond_m.map(rise));
+        let (a, b) = match beside_m.map(|side| side.map(rise)) {
+            [Some(a), Some(b)] => (a, b),
+            [None, None] => return 0.0,
+            [Some(one), None] | [None, Some(one)] => return one,
+        };
+        let (small, large) = (a.abs().min(b.abs()), a.abs().max(b.abs()));
+        if a * b <= 0.0 {
+            return 0.0;
         }
+        let ([Some(low_m), Some(high_m)], [Some(low), Some(high)]) = (beside_m, beyond) else {
+            return small.copysign(a);
+        };
+        let [low, high] = [low, high].map(|beyond| beyond * a.signum());
+        let median = low.min(high).max(small).min(large);
+        let steeper = low.abs().max(high.abs());
+        let span_m = high_m - low_m;
+        let step_m = (rise(span_m) * span_m[self.axis]).abs();
+        let found = match step_m <= max_step_m {
+            true => median.min(steeper),
+            false => median,
+        };
+        found.copysign(a)
     }
 
     /// Inclinations that are beyond a step here, besides none.
-    fn beyond(&self, ground: &GroundOptions) -> Vec<f64> {
+    fn beyond(&self, across: f64, ground: &GroundOptions) -> Vec<f64> {
         let most = ground.max_rise();
         let beyond = self.sides.iter().filter_map(|[_, beyond]| *beyond);
-        let beyond = beyond.map(|inclination| inclination.clamp(-most, most));
+        let beyond = beyond.map(|baseline_m| self.rise(&baseline_m, across).clamp(-most, most));
         std::iter::once(0.0).chain(beyond).collect()
     }
 }

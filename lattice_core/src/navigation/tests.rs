@@ -8,6 +8,7 @@ mod brute_paths;
 mod changes;
 mod elevation;
 mod paths;
+mod steps;
 mod tiles;
 mod work;
 mod world;
@@ -88,33 +89,6 @@ fn curbs_up_to_the_limit() {
             [1.0, 1.0, 0.2],
             truth,
         );
-    }
-}
-
-/// Share of several places at which a robot gets from one side of a curb to the other.
-fn crossed(kind: LatticeKind, side_m: f64, curb_m: f64) -> f64 {
-    let world = World::default()
-        .floor([0.0, 0.0], [4.0, 4.0], 0.0)
-        .wall([4.0, 0.0], [4.0, 4.0], [0.0, curb_m])
-        .floor([4.0, 0.0], [8.0, 4.0], curb_m);
-    let crosses = |seed: u64| {
-        let mapped = Mapped::new(&world, kind, side_m, seed);
-        let grid = mapped.grid(options(), [1.0, 1.0, 0.2]);
-        let reached = mapped.flood(&grid, [1.5, 2.0], |_, _| true);
-        reached.iter().any(|at| at[0] > 5.0)
-    };
-    let count = (0..SEEDS).filter(|seed| crosses(*seed)).count();
-    count as f64 / SEEDS as f64
-}
-
-#[test]
-fn steps_are_told_apart_in_cells_that_are_larger_than_they_are() {
-    for side_m in [0.1, 0.2, 0.3] {
-        for kind in KINDS {
-            assert!(crossed(kind, side_m, 0.05) >= 1.0, "{kind} {side_m}");
-            assert!(crossed(kind, side_m, 0.2) <= 0.0, "{kind} {side_m}");
-        }
-        assert!(crossed(LatticeKind::Fcc, side_m, 0.15) <= 0.0, "{side_m}");
     }
 }
 

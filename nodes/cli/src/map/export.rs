@@ -23,11 +23,14 @@ pub struct Export {
     map: PathBuf,
     /// File to write: .ply, .pcd or .xyz (centres), .bt or .ot (octree of octomap, of half the cell size) or .png (an
     /// image); PLY without extension
-    #[arg(long, short, required_unless_present = "grid")]
+    #[arg(long, short, required_unless_present_any = ["grid", "elevation_map"])]
     out: Option<PathBuf>,
     /// Occupancy grid to write for Nav2's map_server: a .yaml file, and an image (.pgm) beside it
     #[arg(long, value_name = "YAML", conflicts_with_all = ["out", "form"], group = "ground")]
     grid: Option<PathBuf>,
+    /// Heights of the ground to write: a GeoTIFF (.tif) with the layers of `elevation`
+    #[arg(long, value_name = "TIF", conflicts_with_all = ["out", "form"], group = "ground")]
+    elevation_map: Option<PathBuf>,
     #[command(flatten)]
     robot: GridOptions,
     /// Form to write; a `.png` file is always an image
@@ -86,8 +89,11 @@ impl Export {
         if let Some(grid) = &self.grid {
             return self.robot.write(&list()?, grid);
         }
+        if let Some(heights) = &self.elevation_map {
+            return self.robot.write_elevation(&list()?, heights);
+        }
         let Some(out) = &self.out else {
-            return Err("give --out or --grid".into());
+            return Err("give --out, --grid or --elevation-map".into());
         };
         let target = self.target(out)?;
         let list = list()?;

@@ -10,6 +10,7 @@ mod demo;
 mod depth_logs;
 mod doctor;
 mod driver_logs;
+mod elevation_map;
 mod evaluate;
 mod files;
 mod health;

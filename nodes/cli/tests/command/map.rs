@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use crate::{error, json, lattice, text};
 
 /// The map of points in the map frame, with the datum near a place.
-fn map(kind: LatticeKind, datum_m: [f64; 3], points_m: &[[f32; 3]]) -> VoxelList {
+pub fn map(kind: LatticeKind, datum_m: [f64; 3], points_m: &[[f32; 3]]) -> VoxelList {
     let lattice = Lattice::new(kind, 0.125).unwrap();
     let mut list = VoxelList::new(lattice, datum_m.into(), usize::MAX).unwrap();
     list.insert(&Cloud {
@@ -22,7 +22,7 @@ fn map(kind: LatticeKind, datum_m: [f64; 3], points_m: &[[f32; 3]]) -> VoxelList
     list
 }
 
-fn save(directory: &Path, name: &str, list: &VoxelList) -> String {
+pub fn save(directory: &Path, name: &str, list: &VoxelList) -> String {
     let path = directory.join(name);
     write_map(list, std::fs::File::create(&path).unwrap()).unwrap();
     path.display().to_string()

@@ -16,6 +16,9 @@ pub enum ExportError {
         i32::MAX
     )]
     TooManyVertices,
+    /// GeoTIFF that cannot be written.
+    #[error("the GeoTIFF was not written: {0}")]
+    Tiff(#[from] tiff::TiffError),
     /// Octree that cannot be made.
     #[error(transparent)]
     Octree(#[from] OctreeError),
