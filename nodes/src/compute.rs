@@ -10,8 +10,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, SendTimeoutError, Sender, bounded};
 
-use lattice_runtime::Shutdown;
-use lattice_runtime::run_catching_panics;
+use lattice_runtime::{Node, Runtime, Shutdown, Timer, run_catching_panics};
 
 use crate::start::LAST_PIECE;
 
@@ -214,6 +213,25 @@ impl<E> Inbox<E> {
         }
         self.bytes.fetch_sub(bytes, Ordering::Relaxed);
         false
+    }
+
+    /// Timer that sends an event in each period, and rests as [`Runtime::resting_timer`]. A full inbox gets the event in the
+    /// next period.
+    pub fn ticks(
+        &self,
+        (runtime, node): (&Runtime, &Node),
+        period: Duration,
+        event: impl Fn() -> E + Send + 'static,
+    ) -> Timer
+    where
+        E: Send + 'static,
+    {
+        let (inbox, activity) = (self.clone(), node.activity());
+        runtime.resting_timer(period, move || {
+            if !inbox.send(event(), 0) {
+                activity.note();
+            }
+        })
     }
 
     /// Handler that sends each message as an event of its size, and counts rejected

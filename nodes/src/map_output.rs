@@ -83,6 +83,7 @@ impl MapOutput {
     pub fn replaced(&mut self) {
         self.pending.clear();
         self.asked.store(true, Ordering::Relaxed);
+        self.activity.note();
     }
 
     /// Publishes an update, and a round of a keyframe after a request or a lost update.
@@ -120,7 +121,8 @@ impl MapOutput {
             }
             self.pending.pop_front();
         }
-        if !self.pending.is_empty() {
+        // An update may be dropped until it is acknowledged.
+        if !self.pending.is_empty() || !self.updates.is_acknowledged() {
             self.activity.note();
         }
     }

@@ -15,6 +15,9 @@ pub const LAST_PIECE: Duration = Duration::from_millis(500);
 /// Longest wait of an ending node for the acknowledgements of its last messages: a process ends within 2 s of a signal.
 pub const LAST_FLUSH: Duration = Duration::from_millis(500);
 
+/// Least time between two calls of work that is due once a second: resting timers call at whole seconds, some of them late.
+pub const ONCE_A_SECOND: Duration = Duration::from_millis(900);
+
 /// Error of starting a node.
 pub type NodeError = Box<dyn Error + Send + Sync>;
 

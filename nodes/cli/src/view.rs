@@ -173,6 +173,7 @@ fn is_map(path: &Path) -> bool {
 
 /// Shows a map file, or the map of a log or of points, until the process is ended.
 fn show(path: &Path, cells: &CellSize, columns: Columns, server: &ViewerOptions) -> CliResult {
+    crate::init_logging();
     let options = columns.options(MAX_POINTS, &[path])?;
     if kind(path) == Kind::Points {
         let list = quantized(path, cells, &options)?;
@@ -206,7 +207,6 @@ fn show(path: &Path, cells: &CellSize, columns: Columns, server: &ViewerOptions)
 
 /// Map of a point file on the FCC lattice; prints its cell size.
 fn quantized(path: &Path, cells: &CellSize, options: &PointFileOptions) -> CliResult<VoxelList> {
-    crate::init_logging();
     let points = Points::read(path, options)?;
     let (volume_m3, why) = match cells.volume_m3() {
         Some(volume_m3) => (volume_m3, String::new()),

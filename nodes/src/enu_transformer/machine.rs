@@ -87,9 +87,9 @@ impl EnuTransformer {
         out
     }
 
-    /// True if clouds wait for poses.
+    /// True if clouds wait for poses, or poses for their frame.
     pub fn is_waiting(&self) -> bool {
-        self.waiting.len() > 0
+        self.waiting.len() > 0 || !self.waiting_poses.is_empty()
     }
 
     /// Ends the input: returns the clouds that poses cover, and counts the others by the reason of their drop.

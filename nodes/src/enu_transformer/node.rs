@@ -107,11 +107,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         }),
     };
     let clouds = CloudSubscriptions::start(runtime, &node, of_clouds)?;
-    let ticks = inbox.clone();
-    let ticks = runtime.resting_timer(Duration::from_millis(200), move || {
-        // A full inbox checks its queue anyway.
-        let _ = ticks.send(Event::Tick, 0);
-    });
+    let period = Duration::from_millis(200);
+    let ticks = inbox.ticks((runtime, &node), period, || Event::Tick);
     log::info!("{taken}");
     open_params(params, move |params| {
         let settings = Settings::from_params(params).map_err(|error| error.to_string())?;

@@ -21,10 +21,14 @@ pub(super) struct InitialMap {
 }
 
 impl InitialMap {
-    /// Reads the parameters `resume`, for the file of `autosave_file`, and `map_file`.
+    /// Reads the parameters `resume` and `map_file`, which is not the file of saves.
     pub(super) fn from_params(params: &Params, autosave_file: &str) -> Result<Self, ParamError> {
         let resumes = params.bool("resume", false)?;
         let file = params.string("map_file", "")?;
+        if file == autosave_file {
+            let problem = format!("{file:?} is `autosave_file`, which saves replace: rename one");
+            return Err(params.invalid("map_file", problem));
+        }
         Ok(Self {
             saved: resumes.then(|| autosave_file.to_owned()),
             file: (!file.is_empty()).then_some(file),
@@ -174,7 +178,8 @@ mod tests {
         let options = MapperOptions::new(Lattice::new(kind, 0.125).unwrap());
         let mut machine = LatticeMapper::new(options, 1).unwrap();
         let maps = MapFolder::new(&folder.display().to_string()).unwrap();
-        let initial = InitialMap::from_params(&params, "autosave.lattice").unwrap();
+        let initial = InitialMap::from_params(&params, "autosave.lattice");
+        let initial = initial.map_err(|error| error.to_string())?;
         let begun = initial.load(&maps, &mut machine, 1000);
         begun.map_err(|error| error.to_string())?;
         Ok(machine.list().clone())
@@ -206,6 +211,7 @@ mod tests {
             ("nowhere.lattice", LatticeKind::Bcc, "nowhere.lattice"),
             ("../site.lattice", LatticeKind::Bcc, "map_dir"),
             ("site.lattice", LatticeKind::Fcc, "set `lattice`"),
+            ("autosave.lattice", LatticeKind::Bcc, "`autosave_file`"),
         ] {
             let message = begin(kind, &format!("map_file:={file}")).unwrap_err();
             assert!(

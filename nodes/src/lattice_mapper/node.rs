@@ -19,7 +19,7 @@ use super::parameters::Settings;
 use super::services;
 use super::state::LatticeMapper;
 use super::unmapped::Unmapped;
-use crate::compute::{Compute, Inbox};
+use crate::compute::Compute;
 use crate::convert::cloud;
 use crate::hurry::Hurry;
 use crate::map_output::{MapOutput, epoch};
@@ -163,10 +163,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     inputs.watch([&points, &origins, &requests.topic]);
     inputs.watch(&corrections);
     let calls = services::serve(&node, &inbox, Event::Call, maps, Arc::clone(&max_voxels))?;
-    let timer = |period, event: fn() -> Event| {
-        let inbox = inbox.clone();
-        runtime.resting_timer(period, move || notify(&inbox, event()))
-    };
+    let timer = |period, event: fn() -> Event| inbox.ticks((runtime, &node), period, event);
     let updates = timer(settings.update_period, || Event::Update);
     let centers = timer(settings.centers_period, || Event::Centers);
     let free = timer(settings.free_period, || Event::Free);
@@ -187,13 +184,6 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         compute.finish_hurrying(Event::Finish, LAST_EVENTS, || hurry.request());
         Box::new((requests, more, calls))
     }))
-}
-
-/// Sends a timer event; one rejected by a full inbox is repeated at the next period.
-fn notify(inbox: &Inbox<Event>, event: Event) {
-    if !inbox.send(event, 0) {
-        log::debug!("the inbox is full");
-    }
 }
 
 impl ComputeState {

@@ -1,7 +1,6 @@
 //! ROS node around [`MapMerger`].
 
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 use lattice_msgs::lattice::{LatticeMap, LatticeMapUpdate};
 use lattice_msgs::vision_msgs::{LabelInfo, VisionClass};
@@ -18,7 +17,7 @@ use crate::hurry::Hurry;
 use crate::map_input::{MapLosses, MapRequests};
 use crate::map_output::{MapOutput, epoch};
 use crate::report;
-use crate::start::{Finish, LAST_EVENTS, NodeError, handed_over, open_params};
+use crate::start::{Finish, LAST_EVENTS, NodeError, ONCE_A_SECOND, handed_over, open_params};
 
 /// Event for the compute thread.
 enum Event {
@@ -73,7 +72,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         robots: robots.clone(),
         output,
         diagnostics: node.diagnostics(),
-        seconds: Throttle::new(Duration::from_secs(1)),
+        seconds: Throttle::new(ONCE_A_SECOND),
         report_file: settings.report_file,
     };
     let compute = Compute::spawn(
@@ -93,10 +92,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         let update = move |chunk| Event::Update(i, chunk);
         subscriptions.push(losses.subscribe_to(&node, topics, &inbox, map, update)?);
     }
-    let publishes = inbox.clone();
-    let period = runtime.resting_timer(settings.period, move || {
-        let _ = publishes.send(Event::Publish, 0);
-    });
+    let period = inbox.ticks((runtime, &node), settings.period, || Event::Publish);
     open_params(params, move |params| {
         let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
         handed_over(inbox.send(Event::Settings(settings.merger), 0))?;

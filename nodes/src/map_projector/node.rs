@@ -16,7 +16,9 @@ use crate::compute::Compute;
 use crate::hurry::Hurry;
 use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
-use crate::start::{Finish, LAST_EVENTS, LAST_FLUSH, NodeError, handed_over, open_params};
+use crate::start::{
+    Finish, LAST_EVENTS, LAST_FLUSH, NodeError, ONCE_A_SECOND, handed_over, open_params,
+};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{ActionLimits, Activity, Diagnostics, Runtime};
@@ -49,7 +51,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         machine: MapProjector::new(settings.projector).hurried_by(&hurry),
         outputs: outputs.clone(),
         diagnostics: node.diagnostics(),
-        seconds: Throttle::new(Duration::from_secs(1)),
+        seconds: Throttle::new(ONCE_A_SECOND),
         inputs: None,
         wanted: Instant::now(),
         grid_period: settings.grid_period,
@@ -96,12 +98,12 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         }
         false => None,
     };
-    let (projects, goals) = (inbox.clone(), action.clone());
-    let period = runtime.resting_timer(settings.update_period, move || {
+    let goals = action.clone();
+    let period = inbox.ticks((runtime, &node), settings.update_period, move || {
         if let Some(goals) = &goals {
             goals.expire();
         }
-        let _ = projects.send(Event::Project, 0);
+        Event::Project
     });
     open_params(params, move |params| {
         let settings = Settings::from_params(params).map_err(|error| error.to_string())?;

@@ -66,10 +66,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     };
     let images = inside::subscribe(&node, "rgb/image_rect_color", settings.compressed, on_image)?;
     losses.watch(std::slice::from_ref(&images));
-    let looks = inbox.clone();
-    let looks = runtime.resting_timer(Duration::from_millis(500), move || {
-        let _ = looks.send(Event::Diagnose, 0);
-    });
+    let period = Duration::from_millis(500);
+    let looks = inbox.ticks((runtime, &node), period, || Event::Diagnose);
     open_params(params, move |params| {
         let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
         handed_over(inbox.send(Event::Settings(Box::new(settings.segmenter)), 0))

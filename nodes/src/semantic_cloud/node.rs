@@ -97,10 +97,8 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         network = Some(worker);
     }
     losses.watch(&inputs);
-    let looks = inbox.clone();
-    let looks = runtime.resting_timer(Duration::from_millis(500), move || {
-        let _ = looks.send(Event::Diagnose, 0);
-    });
+    let period = Duration::from_millis(500);
+    let looks = inbox.ticks((runtime, &node), period, || Event::Diagnose);
     let set_network = network.as_ref().map(Worker::settings);
     open_params(params, move |params| {
         let settings = Settings::from_params(params).map_err(|error| error.to_string())?;

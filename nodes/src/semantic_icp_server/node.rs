@@ -151,8 +151,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         move |_| notify(&look, Event::Look),
     )?);
     let goals = Arc::clone(&action);
-    let ticks = inbox.clone();
-    let tf_period = runtime.resting_timer(tf_period, move || notify(&ticks, Event::Tick));
+    let tf_period = inbox.ticks((runtime, &node), tf_period, || Event::Tick);
     let diagnoses = inbox.clone();
     let seconds = runtime.timer(DIAGNOSE, move || {
         goals.expire();
@@ -182,7 +181,7 @@ fn hand_over(inbox: &Inbox<Event>, event: Event, bytes: usize, lost: &AtomicU64)
     sent
 }
 
-/// Sends an event that the next tick repeats.
+/// Sends an event whose work is also done with the next one, within a second.
 fn notify(inbox: &Inbox<Event>, event: Event) {
     if !inbox.send(event, 0) {
         log::debug!("the inbox is full");
@@ -259,13 +258,7 @@ impl ComputeState {
                 self.machine.calibrate(call, &goal, now_ns)
             }
             Event::Look => Vec::new(),
-            Event::Tick => {
-                let repeated = self.machine.tick(now_ns);
-                if repeated.is_some() {
-                    self.activity.note();
-                }
-                repeated.into_iter().collect()
-            }
+            Event::Tick => self.machine.tick(now_ns).into_iter().collect(),
             Event::Diagnose => {
                 self.diagnose();
                 let overdue = self.machine.check_keyframe_timeout();
@@ -333,6 +326,8 @@ impl ComputeState {
                     }
                 }
                 Output::Transform(transform) => {
+                    // It is repeated in the next period.
+                    self.activity.note();
                     if let Err(error) = self.outputs.tf.send(vec![transform]) {
                         log::debug!("transform not published: {error}");
                     }

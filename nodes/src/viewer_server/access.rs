@@ -22,8 +22,8 @@ pub struct Access {
     pub fingerprint: Option<String>,
     /// True if other machines reach it.
     is_open: bool,
-    /// URL at the other end of `adb reverse`.
-    usb: String,
+    /// URL at the other end of `adb reverse`, which connects to 127.0.0.1.
+    usb: Option<String>,
     port: u16,
 }
 
@@ -51,13 +51,14 @@ impl Access {
             has_token: auth.token.is_some(),
             fingerprint: identity.map(|identity| identity.fingerprint.clone()),
             is_open: !ip.is_loopback(),
-            usb: format!("{scheme}://localhost:{port}{query}"),
+            usb: (ip.is_unspecified() || ip == Ipv4Addr::LOCALHOST)
+                .then(|| format!("{scheme}://localhost:{port}{query}")),
             port,
         }
     }
 
     /// Lines for a headset or phone: QR code of the URL, other URLs, fingerprint of the certificate. They contain the token, so they are
-    /// for the terminal only; the QR code is left out elsewhere.
+    /// not for a log. The QR code is for a terminal only.
     pub fn for_headset(&self, is_terminal: bool) -> Option<String> {
         let fingerprint = self.fingerprint.as_ref()?;
         let mut text = String::new();
@@ -72,11 +73,12 @@ impl Access {
             text,
             "SHA-256 fingerprint of the certificate: {fingerprint}"
         );
-        let (port, usb) = (self.port, &self.usb);
-        let _ = writeln!(
-            text,
-            "by USB instead: `adb reverse tcp:{port} tcp:{port}`, then {usb} on the headset"
-        );
+        if let (port, Some(usb)) = (self.port, &self.usb) {
+            let _ = writeln!(
+                text,
+                "by USB instead: `adb reverse tcp:{port} tcp:{port}`, then {usb} on the headset"
+            );
+        }
         Some(text)
     }
 }

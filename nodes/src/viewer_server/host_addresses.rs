@@ -11,10 +11,15 @@ pub fn reachable(listening: IpAddr) -> Vec<IpAddr> {
     if !listening.is_unspecified() {
         return vec![listening];
     }
-    let mut found: Vec<IpAddr> = ELSEWHERE.iter().filter_map(|to| source_of(to)).collect();
     let table = |path: &str| fs::read_to_string(path).unwrap_or_default();
+    let lasting: Vec<IpAddr> = ipv6_of(&table("/proc/net/if_inet6"))
+        .map(IpAddr::from)
+        .collect();
+    let mut found: Vec<IpAddr> = ELSEWHERE.iter().filter_map(|to| source_of(to)).collect();
+    // The system prefers addresses that last a short time.
+    found.retain(|source| source.is_ipv4() || lasting.contains(source));
     found.extend(ipv4_of(&table("/proc/net/fib_trie")).map(IpAddr::from));
-    found.extend(ipv6_of(&table("/proc/net/if_inet6")).map(IpAddr::from));
+    found.extend(lasting);
     let mut unique = Vec::new();
     for address in found {
         let is_served = address.is_ipv4() || listening.is_ipv6();

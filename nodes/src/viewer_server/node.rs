@@ -22,7 +22,7 @@ use crate::compute::{Compute, Inbox};
 use crate::hurry::Hurry;
 use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
-use crate::start::{Finish, LAST_EVENTS, NodeError, open_params};
+use crate::start::{Finish, LAST_EVENTS, NodeError, ONCE_A_SECOND, open_params};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Diagnostics, Level, Node, Runtime, SubscriptionExecutor, Undecoded};
@@ -87,7 +87,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         fixed_channel,
         input: MapRequests::new(&node, &reach.mapper, &losses)?,
         diagnostics: node.diagnostics(),
-        seconds: Throttle::new(Duration::from_secs(1)),
+        seconds: Throttle::new(ONCE_A_SECOND),
         report_file,
     };
     // Received by the compute thread's handler at its first event.
@@ -121,9 +121,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         on_fixed,
     )?;
     let period = |viewer: &ViewerOptions| Duration::from_secs_f64(viewer.update_period_s);
-    let ticks = runtime.resting_timer(period(&viewer), move || {
-        let _ = inbox.send(Event::Tick, 0);
-    });
+    let ticks = inbox.ticks((runtime, &node), period(&viewer), || Event::Tick);
     open_params(params, move |params| {
         let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
         ticks.set(period(&settings.viewer));

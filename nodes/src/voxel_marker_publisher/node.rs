@@ -12,7 +12,9 @@ use crate::compute::Compute;
 use crate::hurry::Hurry;
 use crate::map_input::{MapLosses, MapRequests};
 use crate::report;
-use crate::start::{Finish, LAST_EVENTS, LAST_FLUSH, NodeError, handed_over, open_params};
+use crate::start::{
+    Finish, LAST_EVENTS, LAST_FLUSH, NodeError, ONCE_A_SECOND, handed_over, open_params,
+};
 use lattice_runtime::logging::Throttle;
 use lattice_runtime::qos::Qos;
 use lattice_runtime::{Activity, Diagnostics, Level, Publisher, Runtime, Undecoded};
@@ -44,7 +46,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
         machine: VoxelMarkers::new(settings.markers).hurried_by(&hurry),
         markers: publisher.clone(),
         diagnostics: node.diagnostics(),
-        seconds: Throttle::new(Duration::from_secs(1)),
+        seconds: Throttle::new(ONCE_A_SECOND),
         budget_bytes: settings.budget_bytes,
         waits_since: None,
         report_file: settings.report_file,
@@ -61,10 +63,7 @@ pub fn start(runtime: &Runtime, name: &str) -> Result<Finish, NodeError> {
     publisher.on_subscriber_joined(move || {
         let _ = joined.send(Event::Redraw, 0);
     });
-    let draws = inbox.clone();
-    let period = runtime.resting_timer(settings.period, move || {
-        let _ = draws.send(Event::Draw, 0);
-    });
+    let period = inbox.ticks((runtime, &node), settings.period, || Event::Draw);
     open_params(params, move |params| {
         let settings = Settings::from_params(params).map_err(|error| error.to_string())?;
         let event = Event::Settings(settings.markers, settings.budget_bytes);

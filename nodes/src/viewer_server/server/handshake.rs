@@ -27,7 +27,8 @@ pub async fn open(
     let Some(tls) = tls else {
         return Ok((Either::Left(stream), false));
     };
-    if within(TIME, stream.first_byte()).await? != TLS_HANDSHAKE {
+    let first = within(TIME, stream.first_byte()).await;
+    if first.inspect_err(|_| broadcaster.count_tls_failed())? != TLS_HANDSHAKE {
         broadcaster.count_tls_plain();
         return Ok((Either::Left(stream), true));
     }

@@ -57,7 +57,9 @@ pub fn keep(folder: &Path, addresses: &[IpAddr], now: SystemTime) -> Result<Iden
                 let is_named = addresses.first().is_none_or(|first| kept.names(*first));
                 let lost = match (is_named, kept.lasts(now, RENEWED)) {
                     (true, true) => return Ok(kept),
-                    (true, false) => "has ended, or ends within 180 days",
+                    (true, false) => {
+                        "is not valid by the clock of this machine, or ends within 180 days"
+                    }
                     (false, _) => "does not name the address of this machine",
                 };
                 names.extend(kept_names(&path)?);
