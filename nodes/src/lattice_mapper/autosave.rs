@@ -48,7 +48,7 @@ pub(super) struct Autosave {
 }
 
 impl Autosave {
-    /// Creates the saves of a map, the present state of which is not saved.
+    /// Creates the saves of a map, the first one after its next change.
     pub(super) fn new(
         options: AutosaveOptions,
         maps: &MapFolder,

@@ -12,6 +12,9 @@ use super::state::LatticeMapper;
 use crate::files::points::PointFile;
 use crate::start::NodeError;
 
+/// Relative rounding of the edge of a cell, which is the cube root of its volume.
+const ROUNDING: f64 = 1e-9;
+
 /// Files of the first map, below `map_dir`.
 pub(super) struct InitialMap {
     /// File of the last save, if the node resumes.
@@ -100,7 +103,7 @@ fn voxels_of(
     max_voxels: usize,
 ) -> Result<MapContents, String> {
     if let Some(voxel_m) = file.voxel_m
-        && machine.list().lattice().cell_volume_m3().cbrt() < 1.999 * voxel_m
+        && machine.list().lattice().cell_volume_m3().cbrt() < (2.0 - ROUNDING) * voxel_m
     {
         return Err(format!(
             "has voxels of {voxel_m} m, whose centres leave holes among smaller cells than twice that: set \

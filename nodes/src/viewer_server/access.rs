@@ -10,7 +10,7 @@ use super::host_addresses::reachable;
 use super::http::RequestAuth;
 use super::tls::Identity;
 
-/// How browsers reach the server.
+/// URLs of the server, for browsers of this machine and others.
 pub struct Access {
     /// URL of the page, with its token.
     pub url: String,
